@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Dict, Mapping, Tuple
+from typing import Callable, Dict, Mapping, Tuple
 
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, ModelInfo
 
@@ -24,14 +24,25 @@ class TrimsOnChange:
 
     def __init__(self) -> None:
         self._changed: Dict[str, Tuple[float, float]] = {}  # by channel: its value, and since when it is that [s]
+        self._commanded: Dict[Tuple[int, str], bool] = {}  # by mode and channel, when last sent in it
 
-    def leave_out(self, sent: Dict[str, float], now: float) -> None:
-        """Takes out of what the arbiter sends the trims that tx_node no longer sends."""
+    def leave_out(self, sent: Dict[str, float], mode: int, commands: Callable[[str], bool], now: float) -> None:
+        """Takes out of what the arbiter sends the trims that tx_node no longer sends.
+
+        Args:
+            sent: By channel.
+            mode: Of the arbiter.
+            commands: Whether what flies commands a channel.
+            now: [s]
+        """
         for name in TRIMS:
+            commanded = commands(name)
+            anew = commanded and not self._commanded.get((mode, name), False)
+            self._commanded[mode, name] = commanded
             if name not in sent:
                 continue
             value, since = self._changed.get(name, (None, now))
-            if sent[name] != value:
+            if anew or sent[name] != value:
                 self._changed[name] = sent[name], now
             elif now - since > TRIM_REPEAT_S:
                 del sent[name]

@@ -101,7 +101,7 @@ class Emulator:
 
     def _new_simulator(self) -> Simulator:
         o = self.options
-        pilot = None if self._scenario is None else ScenarioPilot(self._scenario)
+        pilot = None if self._scenario is None else ScenarioPilot(self._scenario, self.options.version)
         inputs = InputOptions(o.joystick == "attached", o.auto_coordination)
         sim = Simulator(
             self._make_model,

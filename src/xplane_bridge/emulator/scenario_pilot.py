@@ -49,15 +49,19 @@ _NAMES = ", ".join(f"{system}_1..{count}" for system, count, _ in _SYSTEMS)
 class ScenarioPilot:
     """Callable that the emulator asks once a frame: (flight time, frame) -> PilotCommands.
 
+    Args:
+        scenario: What to fly.
+        version: Of the X-Plane that the emulator is, one of `xplane_names.VERSIONS`.
+
     Raises:
         ScenarioError: The scenario asks for what only a client can bring about.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, version: str) -> None:
         for event in scenario.events:
             for kind, value in event.actions:
                 if kind == "failure":
-                    _check_failure(value)
+                    _check_failure(value, version)
                 if kind == "excitation" and "," in value["target"]:
                     raise ScenarioError(
                         "excitation: the emulator's pilot moves one axis; tx_node moves several at once"
@@ -146,16 +150,17 @@ def failure_leaves(name: str) -> Tuple[str, ...]:
     return SYSTEMS.get(name, ())
 
 
-def _check_failure(failure: Mapping[str, Any]) -> None:
+def _check_failure(failure: Mapping[str, Any], version: str) -> None:
     """Looks whether the pilot can bring a failure about.
 
     Raises:
         ScenarioError: It cannot.
     """
-    if not failure_leaves(failure["name"]):
+    leaves = failure_leaves(failure["name"])
+    if not leaves or not all(version in versions_with(_FAILURES + leaf) for leaf in leaves):
         raise ScenarioError(
-            f"failure {failure['name']!r}: expected {_NAMES}, or a rel_* dataref that X-Plane has; surfaces fail "
-            "through tx_node (set_failure), not by the emulator's pilot"
+            f"failure {failure['name']!r}: expected {_NAMES}, or a rel_* dataref that X-Plane {version} has; surfaces "
+            "fail through tx_node (set_failure), not by the emulator's pilot"
         )
     refusal = in_part(failure)
     if refusal:

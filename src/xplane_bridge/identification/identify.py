@@ -107,7 +107,9 @@ def identify(
     if validate is not None and asked and validate not in asked:
         numbers = ", ".join(map(str, asked))
         of_axis = "" if axis is None else f" for the {axis} axis"
-        msg = f"excitation {validate} cannot be kept for validation; {flight.name} has{of_axis}: {numbers}"
+        about = f"excitation {validate} "
+        left_out = "".join(f"; {note}" for note in (*notes, *reasons) if about in note)
+        msg = f"{about}cannot be kept for validation; {flight.name} has{of_axis}: {numbers}{left_out}"
         raise IdentificationError(msg)
     results = {}
     for name, mine in usable.items():

@@ -189,7 +189,7 @@ class Aircraft:
         sent = self._arbiter.step(now) if excited is None else self._arbiter.step(now, excited, value)
         # Not by a loop or a call, which take longer: few flights command trims.
         if "trim_pitch" in sent or "trim_roll" in sent or "trim_yaw" in sent:
-            self._trims.leave_out(sent, now)
+            self._trims.leave_out(sent, self.mode, self.commands, now)
         apply_channels(sent, self.controls, self.model)
         state = self.model.step(self.period, self.failures.apply(self.controls, self.period))
         self.frame += 1

@@ -99,6 +99,7 @@ def parse_scenario(document: Any) -> Scenario:
         raise ScenarioError(f"events: {short(events)}; expected a list of at least one event")
     parsed = tuple(_event(item, f"events[{i}]") for i, item in enumerate(events))
     _check_times(parsed, repeat)
+    _check_repairs(parsed)
     criteria = _criteria(top.get("criteria", {}), parsed)
     description = expect_text(top, "description", "")
     return Scenario(name, description, tuple(aircraft), repeat, start, gains, criteria, parsed, controller, aerodrome)
@@ -119,6 +120,18 @@ def _aerodrome(item: Any) -> Dict[str, float]:
     if given and missing:
         raise ScenarioError(f"aerodrome.{missing[0]}: missing; expected {', '.join(_AERODROME)}")
     return given
+
+
+def _check_repairs(events: Sequence[Event]) -> None:
+    """A misspelt name would repair nothing, without a word in most players."""
+    failures = [(i, value) for i, event in enumerate(events) for kind, value in event.actions if kind == "failure"]
+    broken = sorted({value["name"] for _, value in failures if not value["clear"]})
+    for i, value in failures:
+        if value["clear"] and value["name"] not in broken:
+            raise ScenarioError(
+                f"events[{i}].failure.name: {value['name']!r} is cleared, but no event breaks it; expected "
+                f"{' or '.join(broken) or 'an event that does'}"
+            )
 
 
 def _check_times(events: Sequence[Event], repeat: Optional[float]) -> None:

@@ -122,13 +122,13 @@ class Player:
         self._taps.clear()
         held_back, self._held_back = self._held_back, []
         for value in held_back:
-            self._excite(value, now, commands.actions)
+            self._excite(value, now, 0.0, commands.actions)
         self._fire(now, sample, commands.actions)
         self._fly(now, dt, sample, commands)
         commands.handles = dict(self._handles)
         commands.taps = self._taps - self._buttons
         commands.buttons = self._buttons | commands.taps
-        commands.finished = self._finished
+        commands.finished = self._finished and not self._held_back
         return commands
 
     # --- events -------------------------------------------------------------------------------------------------------
@@ -192,13 +192,13 @@ class Player:
         elif kind != "excitation":
             actions.append(Action(kind, value, now))
         elif now > 0.0:
-            self._excite(value, now, actions)
+            self._excite(value, now, now, actions)
         else:  # the first commands are those of this step
             self._held_back.append(value)
 
-    def _excite(self, value: Mapping[str, Any], now: float, actions: List[Action]) -> None:
+    def _excite(self, value: Mapping[str, Any], now: float, event_time: float, actions: List[Action]) -> None:
         self._running.append((now, value))
-        actions.append(Action("excitation", value, now))
+        actions.append(Action("excitation", value, event_time))
 
     def _present(self, axis: str, now: float) -> float:
         """Where a movement of this axis begins: where a hold has it, or else the movement before."""

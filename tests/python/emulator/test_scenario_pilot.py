@@ -14,6 +14,7 @@ from xplane_bridge.emulator.options import parse
 from xplane_bridge.emulator.scenario_pilot import SYSTEMS, ScenarioPilot, failure_leaves
 from xplane_bridge.emulator.simulator import Simulator
 from xplane_bridge.scenario import Scenario, ScenarioError, parse_scenario
+from xplane_bridge.xplane_names import NEWEST
 
 
 def scenario(*events: dict) -> Scenario:
@@ -22,10 +23,12 @@ def scenario(*events: dict) -> Scenario:
 
 def test_pilot_refuses_what_it_cannot_do() -> None:
     with pytest.raises(ScenarioError, match="surfaces fail through tx_node"):
-        ScenarioPilot(scenario({"at": 0, "failure": {"name": "aileron1_wing2_left", "kind": "stuck", "value": 5}}))
+        ScenarioPilot(
+            scenario({"at": 0, "failure": {"name": "aileron1_wing2_left", "kind": "stuck", "value": 5}}), NEWEST["11"]
+        )
     for more in ({"kind": "reduced", "value": 0.5}, {"value": 1}):
         with pytest.raises(ScenarioError, match=r"engine_1.*expected kind failed, and no value: a system works"):
-            ScenarioPilot(scenario({"at": 0, "failure": {"name": "engine_1", **more}}))
+            ScenarioPilot(scenario({"at": 0, "failure": {"name": "engine_1", **more}}), NEWEST["11"])
 
 
 def test_a_system_fails_as_by_tx_node() -> None:
@@ -40,7 +43,8 @@ def test_a_system_fails_as_by_tx_node() -> None:
     assert SYSTEMS["gyro_2"] == ("rel_cop_ahz", "rel_cop_dgy")
     pilot = ScenarioPilot(
         scenario({"at": 0, "failure": {"name": "gyro_1"}}, {"at": 1, "failure": {"name": "gyro_1", "clear": True}},
-                 {"at": 2, "failure": {"name": "gyro_1"}}, {"at": 3, "clear_failures": True})
+                 {"at": 2, "failure": {"name": "gyro_1"}}, {"at": 3, "clear_failures": True}),
+        NEWEST["11"],
     )  # fmt: skip
     names = [f"sim/operation/failures/{leaf}" for leaf in ("rel_ss_ahz", "rel_ss_dgy")]
     frame = Simulator(create_model, "fixed_wing").frame
@@ -51,16 +55,32 @@ def test_a_system_fails_as_by_tx_node() -> None:
 @pytest.mark.parametrize("name", ["engine_9", "engine_12", "generator_9", "bus_7", "gyro_3", "rel_nonsense", "wing"])
 def test_the_pilot_refuses_a_failure_that_no_x_plane_has(name: str) -> None:
     with pytest.raises(ScenarioError, match=rf"failure '{name}': expected engine_1\.\.8, bus_1\.\.6, .* or a rel_\*"):
-        ScenarioPilot(scenario({"at": 0, "failure": {"name": name}}))
+        ScenarioPilot(scenario({"at": 0, "failure": {"name": name}}), NEWEST["11"])
+
+
+@pytest.mark.parametrize("version", ["11", "12"])
+def test_the_pilot_refuses_a_failure_of_another_x_plane(version: str) -> None:
+    asked = scenario({"at": 0, "failure": {"name": "rel_fcon_ailn_1_lft_mxup"}})
+    if version == "12":
+        ScenarioPilot(asked, NEWEST[version])
+        return
+    with pytest.raises(ScenarioError, match=rf"or a rel_\* dataref that X-Plane {NEWEST[version]} has"):
+        ScenarioPilot(asked, NEWEST[version])
+
+
+@pytest.mark.parametrize("version", ["11", "12"])
+def test_the_pilot_takes_every_system_in_every_x_plane(version: str) -> None:
+    for name in SYSTEMS:
+        ScenarioPilot(scenario({"at": 0, "failure": {"name": name}}), NEWEST[version])
 
 
 @pytest.mark.parametrize("target", ["throttle", "aileron1_wing2_left", "roll,pitch"])
 def test_the_emulators_pilot_refuses_excitations_that_it_does_not_fly(target: str) -> None:
     excitation = {"kind": "multisine", "amplitude": 0.1, "duration": 2}
     for axis in ("roll", "pitch", "yaw"):
-        ScenarioPilot(scenario({"at": 0, "excitation": {**excitation, "target": axis}}))
+        ScenarioPilot(scenario({"at": 0, "excitation": {**excitation, "target": axis}}), NEWEST["11"])
     with pytest.raises(ScenarioError, match=r"excitation.*: the emulator's pilot moves .*; tx_node moves"):
-        ScenarioPilot(scenario({"at": 0, "excitation": {**excitation, "target": target}}))
+        ScenarioPilot(scenario({"at": 0, "excitation": {**excitation, "target": target}}), NEWEST["11"])
 
 
 @pytest.mark.parametrize(

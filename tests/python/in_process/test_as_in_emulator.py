@@ -14,7 +14,7 @@ from xplane_bridge.emulator import command_channels
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.flight.failure_effects import TRIM_FAILURES
 from xplane_bridge.emulator.simulator import Simulator
-from xplane_bridge.in_process.aircraft import MANUAL, Aircraft, Conditions, initial_state
+from xplane_bridge.in_process.aircraft import AUTO, MANUAL, Aircraft, Conditions, initial_state
 
 DT = 1.0 / 60.0
 OVERRIDE = "sim/operation/override/override_joystick_"
@@ -130,6 +130,23 @@ def test_a_trim_is_sent_for_a_while_after_its_change() -> None:
     flown.fail("rel_elv_trim_run", clear=True)
     flown.fly(0.2)
     assert flown.aircraft.controls.trim_pitch == 0.25
+
+
+def test_a_trim_that_is_commanded_anew_is_sent_though_it_is_the_same() -> None:
+    """As in tests/cpp/actuation/control_path/handles.cpp; a change of the mode alone begins no command."""
+    trims = command_channels.TrimsOnChange()
+
+    def is_sent(now: float, commanded: bool, mode: int = MANUAL) -> bool:
+        sent = {"trim_pitch": 0.25}
+        trims.leave_out(sent, mode, lambda _: commanded, now)
+        return bool(sent)
+
+    assert is_sent(0.0, True)
+    assert not is_sent(1.0, True)
+    assert not is_sent(2.0, False)
+    assert is_sent(3.0, True)
+    assert not is_sent(4.0, False, AUTO)
+    assert not is_sent(5.0, True)
 
 
 def test_trims_are_sent_as_long_as_by_tx_node() -> None:

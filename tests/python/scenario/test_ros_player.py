@@ -69,7 +69,7 @@ def test_tx_node_hears_the_mode_requests_of_a_second_run(monkeypatch):
     assert player({"at": 60, "end": True})._mode_sequence >= first._mode_sequence + 60
 
 
-def calls_of(monkeypatch, codes, event, flying_class=RosPlayer, message="", **options):
+def calls_of(monkeypatch, codes, event, flying_class=RosPlayer, message="", before=(), **options):
     """Plays an event whose service answers with these codes, one after the other; gives how often it was called, and
     what was said. The answers' message is the code's name where none is given.
     """
@@ -96,9 +96,10 @@ def calls_of(monkeypatch, codes, event, flying_class=RosPlayer, message="", **op
     monkeypatch.setattr(ros_player.time, "monotonic", lambda: now[0])
     monkeypatch.setattr(ros_player.time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
     said = []
-    scenario = parse_scenario({"name": "test", "events": [{"at": 0, **event}, {"at": 60, "end": True}]})
+    events = [*before, {"at": 0, **event}, {"at": 60, "end": True}]
+    scenario = parse_scenario({"name": "test", "events": events})
     flying = flying_class(scenario, "/xplane", say=said.append, **options)
-    ((kind, value),) = scenario.events[0].actions
+    ((kind, value),) = scenario.events[len(before)].actions
     flying._act(Action(kind, value, 0.0))
     return len(calls), said
 
@@ -133,10 +134,15 @@ def test_repairing_what_is_not_broken_is_no_error_but_said(monkeypatch):
     """As in process; tx_node refuses it."""
     assert ros_player._NOT_BROKEN in (ROOT / "lib/actuation/failure_requests.cpp").read_text(encoding="utf-8")
     repair = {"failure": {"name": "engine_2", "clear": True}}
+    broken = [{"at": 0, "failure": {"name": "engine_2"}}]
     answer = '"engine_2" is not broken: expected nothing, all is well'
-    assert calls_of(monkeypatch, [REFUSED], repair, message=answer) == (1, [f"repairing engine_2: {answer}"])
+    assert calls_of(monkeypatch, [REFUSED], repair, message=answer, before=broken) == (
+        1,
+        [f"repairing engine_2: {answer}"],
+    )
+    other = "engine_2 was failed in the simulator: set include_simulator"
     with pytest.raises(ScenarioError, match="set include_simulator"):
-        calls_of(monkeypatch, [REFUSED], repair, message="engine_2 was failed in the simulator: set include_simulator")
+        calls_of(monkeypatch, [REFUSED], repair, message=other, before=broken)
 
 
 def begun(flying):

@@ -100,6 +100,16 @@ def test_the_example_of_the_manual_is_a_scenario():
         ({"name": "x", "events": [{"at": 0, "reset": {"start": [1]}}]}, r"reset\.start: \[1\]; expected one of place"),
         ({"name": "x", "events": [{"at": 0, "hat": {"y": 1}}]}, r"events\[0\].hat: unknown key; .*handles"),
         ({"name": "x", "events": [{"at": 0, "buttons": {"press": [99]}}]}, "button numbers 0..63"),
+        (
+            {
+                "name": "x",
+                "events": [
+                    {"at": 0, "failure": {"name": "engine_1"}},
+                    {"at": 1, "failure": {"name": "engine_l", "clear": True}},
+                ],
+            },
+            r"events\[1\]\.failure\.name: 'engine_l' is cleared, but no event breaks it; expected engine_1",
+        ),
         ({"name": "x", "gains": {"rol": 1}, "events": [{"at": 0}]}, "gains.rol: unknown key"),
         ({"name": "x", "start": {"altitude": 1e6}, "events": [{"at": 0}]}, "start.altitude: 1000000.0"),
         ({"name": "x", "start": {"on_ground": 1}, "events": [{"at": 0}]}, "start.on_ground: 1; expected true or false"),
@@ -210,6 +220,13 @@ def test_it_finishes_when_all_is_done_or_at_an_end():
     steps = play(player, 4.0)
     assert labels(steps) == []
     assert steps[-1][1].finished
+
+
+def test_it_finishes_after_the_excitation_of_its_first_step():
+    doublet = {"kind": "doublet", "target": "roll", "amplitude": 0.1, "duration": 1}
+    steps = play(Player(scenario({"at": 0, "excitation": doublet, "end": True})), 1.0)
+    assert [commands.finished for _, commands in steps][:2] == [False, True]
+    assert [action.kind for action in steps[1][1].actions] == ["excitation"]
 
 
 def test_it_repeats():

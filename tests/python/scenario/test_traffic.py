@@ -11,6 +11,7 @@ import pytest
 from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
 from xplane_bridge.scenario import ScenarioError, load_scenario, parse_scenario
 from xplane_bridge.scenario.traffic import ScenarioTraffic
+from xplane_bridge.xplane_names import NEWEST
 
 ROOT = Path(__file__).resolve().parents[3]
 DEGREE_M = 6378145.0 * math.pi / 180.0
@@ -71,7 +72,7 @@ def test_what_is_wrong_is_said(value, said):
 def test_the_emulators_pilot_refuses_it():
     scenario = parse_scenario({"name": "t", "events": [{"at": 0, "traffic": []}]})
     with pytest.raises(ScenarioError, match="traffic/command"):
-        ScenarioPilot(scenario)
+        ScenarioPilot(scenario, NEWEST["11"])
 
 
 def test_the_conflict_scenario_would_be_a_collision():

@@ -14,6 +14,7 @@ from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
 from xplane_bridge.scenario import ScenarioError, parse_scenario
 from xplane_bridge.scenario.resets import NUMBERS, STARTS, TEXTS, reset_request
 from xplane_bridge.scenario.world import DISTURBANCES, disturbance_request, time_request, weather_request, wind_request
+from xplane_bridge.xplane_names import NEWEST
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -177,6 +178,6 @@ def test_what_flies_without_the_bridge_refuses_them(actions):
     scenario = parse_scenario({"name": "t", "events": [{"at": 0, **actions}]})
     (kind,) = actions
     with pytest.raises(ScenarioError, match=f"tx_node sets {kind}"):
-        ScenarioPilot(scenario)
+        ScenarioPilot(scenario, NEWEST["11"])
     with pytest.raises(CampaignError, match=f"{kind}: takes the bridge"):
         _refuse_unflyable(scenario)
