@@ -149,8 +149,10 @@ void ControlPath::prepareLevers(const core::ArbitratedControls& controls) {
 
 core::ChannelSet ControlPath::channelsToSend(const core::ArbitratedControls& controls, double time) {
   const core::ChannelSet commanded = arbiter_.commanded();
-  // A handle that is commanded anew is sent, also with the value of before: the cockpit may have moved it since.
-  ever_sent_ &= ~(commanded & ~std::exchange(commanded_, commanded));
+  // A handle that is commanded anew is sent, also with the value of before: the cockpit may have moved it since. A
+  // change of the mode alone begins no command.
+  core::ChannelSet& before = commanded_.at(static_cast<std::size_t>(arbiter_.status().mode));
+  ever_sent_ &= ~(commanded & ~std::exchange(before, commanded));
   core::ChannelSet out;
   for (std::size_t i = 0; i < core::kChannelCount; ++i) {
     if (!controls.active.test(i)) continue;

@@ -216,7 +216,7 @@ class ControlPath {
   core::ChannelValues last_values_{};                     // of Refresh::kOnChange channels
   std::array<double, core::kChannelCount> changed_at_{};  // [s] steady; of the same
   core::ChannelSet ever_sent_;                            // since forgetApplied(); handles as commanded now
-  core::ChannelSet commanded_;                            // as of the last sending
+  std::array<core::ChannelSet, 3> commanded_;             // in each mode, as of the last sending in it
   core::ChannelSet handles_shown_;                        // by X-Plane, since they were changed
   std::vector<core::DatarefWrite> writes_;
 

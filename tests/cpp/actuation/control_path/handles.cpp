@@ -70,6 +70,24 @@ TEST_F(HandlesTest, OneThatIsCommandedAnewIsSentThoughItIsTheSame) {
   EXPECT_FLOAT_EQ(sim.value(kFlapHandle), 0.5F);
 }
 
+TEST_F(HandlesTest, AChangeOfTheModeAloneSendsNone) {
+  start();
+  const auto flyBoth = [this] {
+    for (int i = 0; i < 20; ++i) {
+      path->command(FlightMode::kManual, rollAndFlaps(0.25, 0.5));
+      path->command(FlightMode::kAuto, rollCommand(0.25));
+      frame();
+    }
+  };
+  flyBoth();
+  ask(FlightMode::kAuto);
+  flyBoth();
+  sim.set(kFlapHandle, 1.0F);
+  ask(FlightMode::kManual);
+  flyBoth();
+  EXPECT_FLOAT_EQ(sim.value(kFlapHandle), 1.0F);
+}
+
 TEST_F(HandlesTest, OneThatIsMovedInTheCockpitEndsNoReadBack) {
   start();
   runWith(rollAndFlaps(0.25, 0.5), 1.0);
