@@ -252,7 +252,7 @@ void Actuation::onHang() {
   overrides_.giveBackAll();
   failures_.repaired("tx_node hung");
   traffic_.forget();
-  disturbance_.abort("tx_node hung");
+  disturbance_.onHang();
   path_.onGivenBack("tx_node hung, and its guardian has given back what it had set");
 }
 

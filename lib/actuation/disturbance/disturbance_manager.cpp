@@ -15,9 +15,10 @@ namespace {
 
 using Lock = std::lock_guard<core::HandlerMutex>;
 
-constexpr double kAskWait = 3.0;  // [s] for X-Plane to show its weather
-constexpr double kRepeat = 1.0;   // [s] after which also what has not changed is sent: datagrams get lost
-constexpr double kGap = 0.4;      // [s] without a frame in which the guardian may have put the weather back
+constexpr double kAskWait = 3.0;   // [s] for X-Plane to show its weather
+constexpr double kRepeat = 1.0;    // [s] after which also what has not changed is sent: datagrams get lost
+constexpr double kGap = 0.4;       // [s] without a frame, in which the guardian may have put the weather back
+constexpr double kHangWait = 0.5;  // [s] until it would be known that it was the guardian
 constexpr int kTimesPutBack = 2;
 constexpr double kMostWind = 100.0;  // [m/s] as set_wind
 constexpr const char* kNotYet = "the wind of before the last disturbance could not be put back yet";
@@ -87,7 +88,7 @@ void DisturbanceManager::onWeather(std::uint32_t id, const std::vector<std::stri
     return end("refused: " + core::whyNotChanged(error), false);
   }
   restores_ = std::move(all);
-  changed_ = false;
+  sent_frames_ = noted_frames_ = 0;
   framed_at_ = link_->clock().steadySeconds();
   times_put_back_ = 0;
   const auto speed = static_cast<double>(*values[weather]);
@@ -102,7 +103,8 @@ void DisturbanceManager::onFrame(const core::FlightWatch& watch) {
   const Lock lock(mutex_);
   if (up_ && std::exchange(unsure_, false) && state_ == State::kIdle) putBack();
   if (state_ != State::kRunning) return;
-  if (takeGap() && isPutBackByAnother()) return end("aborted: the wind was put back while no frame came", false);
+  if (isQuiet() && isPutBackByAnother()) return endAsPutBack();
+  framed_at_ = link_->clock().steadySeconds();
   if (!std::isfinite(watch.sim_time)) return;
   if (!label_.active) {
     label_.active = true;
@@ -127,7 +129,7 @@ void DisturbanceManager::onFrame(const core::FlightWatch& watch) {
 }
 
 void DisturbanceManager::send(const Eigen::Vector3d& wind_ned) {
-  changed_ = true;
+  ++sent_frames_;
   core::UniformWind wind;
   wind.speed = label_.wind_speed = wind_ned.norm();
   wind.from_deg = label_.wind_from_deg = core::windFromDirectionDeg(wind_ned);
@@ -141,13 +143,8 @@ void DisturbanceManager::send(const Eigen::Vector3d& wind_ned) {
   sent_ = writes;
 }
 
-/// Whether no frame has come for so long that what was put back meanwhile, as after a hang, was not changed again.
-bool DisturbanceManager::takeGap() {
-  const double now = link_->clock().steadySeconds();
-  if (now - std::exchange(framed_at_, now) <= kGap) return false;
-  changed_ = false;
-  return true;
-}
+/// Whether no frame has come for so long that this process may have hung.
+bool DisturbanceManager::isQuiet() const { return link_->clock().steadySeconds() - framed_at_ > kGap; }
 
 /// By the guardian or another client: the journal has no entry any more, as far as it can be read.
 bool DisturbanceManager::isPutBackByAnother() const {
@@ -163,7 +160,7 @@ void DisturbanceManager::putBack() {
   const auto journal = link_->journal();
   if (restores_.empty() || !journal) return;
   const bool noted = !isPutBackByAnother();
-  if (!noted && !changed_) {
+  if (!noted && sent_frames_ == noted_frames_) {
     restores_.clear();
     return;
   }
@@ -177,7 +174,7 @@ void DisturbanceManager::putBack() {
       if (link_->sendUndo(operation) != core::SendStatus::kSent) all_sent = false;
     }
     put_back_again_at_ = link_->clock().steadySeconds() + kRepeat;
-    if (noted) changed_ = false;
+    if (noted) noted_frames_ = sent_frames_;
     if (all_sent) ++times_put_back_;
     if (times_put_back_ < kTimesPutBack) return;
     journal->remove({kEntry});
@@ -187,12 +184,11 @@ void DisturbanceManager::putBack() {
   }
 }
 
-void DisturbanceManager::end(const std::string& result, bool success) {
+void DisturbanceManager::end(const std::string& result, bool success, PutBack when) {
   const bool began = label_.active;
   state_ = State::kIdle;
   disturbance_.reset();
-  takeGap();
-  putBack();
+  if (when == PutBack::kNow) putBack();
   label_.active = false;
   label_.model = label_.commanded = Eigen::Vector3d::Zero();
   label_.wind_speed = label_.steady.norm();
@@ -201,6 +197,20 @@ void DisturbanceManager::end(const std::string& result, bool success) {
   label_.result = result;
   publish();
   report_(described(label_) + ": " + result, who_, success);
+}
+
+/// The journal has lost its entry. Frames may have changed the wind since, but not if the guardian was it: then
+/// onHang() comes first.
+void DisturbanceManager::endAsPutBack() {
+  put_back_again_at_ = link_->clock().steadySeconds() + kHangWait;
+  end("aborted: another client has put the wind back", false, PutBack::kLater);
+}
+
+void DisturbanceManager::onHang() {
+  const Lock lock(mutex_);
+  // What was sent before the hang is what the guardian has put back.
+  if (isQuiet() && isPutBackByAnother()) noted_frames_ = sent_frames_;
+  state_ == State::kIdle ? putBack() : end("aborted: tx_node hung", false);
 }
 
 bool DisturbanceManager::abort(const std::string& why) {
@@ -255,12 +265,16 @@ void DisturbanceManager::watch() {
   if (state_ != State::kRunning || !journal || now < looked_at_ + kRepeat) return;
   looked_at_ = now;
   const std::uint32_t id = label_.id;
+  const unsigned frames = sent_frames_;
   lock.unlock();  // another process may hold the journal
   const bool noted = core::ownEntry(*journal, kEntry).has_value();
   lock.lock();
-  // Put back once more: frames may have been sent since.
-  if (!noted && state_ == State::kRunning && id == label_.id)
-    end("aborted: another client has put the wind back", false);
+  if (state_ != State::kRunning || id != label_.id) return;
+  if (noted) {
+    noted_frames_ = frames;
+  } else {
+    endAsPutBack();
+  }
 }
 
 std::string DisturbanceManager::windRefusal() {

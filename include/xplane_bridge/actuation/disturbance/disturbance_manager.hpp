@@ -58,7 +58,9 @@ class DisturbanceManager {
   void forget();
   /// Ends the one that runs, as aborted, and puts the weather back. Returns whether one ran.
   bool abort(const std::string& why);
-  /// The same for good: none begins any more, and the weather is put back at once.
+  /// This process has hung, and its guardian may have put the weather back: to be called as soon as that is known.
+  void onHang();
+  /// abort() for good: none begins any more, and the weather is put back at once.
   void stop(const std::string& why);
   /// Called now and then, without a lock held: ends the one that runs when another process has put the weather back,
   /// which the journal shows; puts the weather back a second time.
@@ -76,10 +78,12 @@ class DisturbanceManager {
   void onWeather(std::uint32_t id, const std::vector<std::string>& names,
                  const std::vector<core::DatarefValue>& values);
   void send(const Eigen::Vector3d& wind_ned);
-  bool takeGap();
+  bool isQuiet() const;
   bool isPutBackByAnother() const;
   void putBack();
-  void end(const std::string& result, bool success);
+  enum class PutBack : std::uint8_t { kNow, kLater };
+  void end(const std::string& result, bool success, PutBack when = PutBack::kNow);
+  void endAsPutBack();
 
   core::SimulatorPort* link_;
   const std::string purpose_;
@@ -95,7 +99,8 @@ class DisturbanceManager {
   std::optional<core::Disturbance> disturbance_;
   std::vector<core::UndoOperation> restores_;  // what is still to be put back
   bool unsure_ = false;                        // whether this X-Plane is theirs: its next frame shows it
-  bool changed_ = false;                       // the weather, perhaps since another process has put it back
+  unsigned sent_frames_ = 0;                   // of this disturbance
+  unsigned noted_frames_ = 0;                  // of these, sent before the journal was seen to have its entry
   double framed_at_ = 0.0;                     // [s] steady, last
   int times_put_back_ = 0;
   double put_back_again_at_ = 0.0;  // [s] steady

@@ -275,7 +275,36 @@ TEST_F(DisturbanceManagerTest, EndsWhenAnotherClientHasPutTheWindBack) {
   sim_.clearMessages();
   manager_.watch();
   EXPECT_EQ(labels_.back().result, "aborted: another client has put the wind back");
+  settle();
   EXPECT_EQ(weather(), before_) << "frames since then have changed it again";
+}
+
+TEST_F(DisturbanceManagerTest, KeepsAWindThatIsSetWhereNoFrameHasChangedItSinceItWasPutBack) {
+  begin();
+  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
+  fly(1.0);
+  manager_.watch();  // the entry is there, and X-Plane is paused from here on
+  sim_.journal()->remove({journal()[0].id});
+  sim_.set(kSpeed11, 40.0F);
+  for (int i = 0; i < 30; ++i) {
+    sim_.frame(0.1);
+    manager_.watch();
+  }
+  EXPECT_EQ(labels_.back().result, "aborted: another client has put the wind back");
+  EXPECT_EQ(sim_.value(kSpeed11), 40.0F);
+}
+
+TEST_F(DisturbanceManagerTest, PutsTheWeatherBackWhereAHitchHidesThatFramesHaveChangedIt) {
+  begin();
+  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
+  fly(1.0);
+  sim_.journal()->remove({journal()[0].id});
+  fly(0.2);
+  sim_.frame(0.6);
+  fly(0.2);
+  EXPECT_EQ(labels_.back().result, "aborted: another client has put the wind back");
+  settle();
+  EXPECT_EQ(weather(), before_);
 }
 
 /// The guardian has put the weather back while this process stood, and the user has set a wind since.
@@ -301,7 +330,7 @@ TEST_F(DisturbanceManagerHang, KeepsTheWindThatWasSetAfterTheGuardianHasPutItBac
   EXPECT_EQ(manager_.begin(gust(), "/test"), "");
   fly(1.0);
   hang();
-  manager_.abort("tx_node hung");
+  manager_.onHang();
   EXPECT_EQ(labels_.back().result, "aborted: tx_node hung");
   expectTheUsersWindIsKept();
 }
@@ -312,8 +341,8 @@ TEST_F(DisturbanceManagerHang, KeepsItAlsoWhereAFrameComesFirst) {
   fly(1.0);
   hang();
   fly(0.1);
-  EXPECT_EQ(labels_.back().result, "aborted: the wind was put back while no frame came");
-  manager_.abort("tx_node hung");
+  EXPECT_EQ(labels_.back().result, "aborted: another client has put the wind back");
+  manager_.onHang();
   expectTheUsersWindIsKept();
 }
 
@@ -324,6 +353,7 @@ TEST_F(DisturbanceManagerHang, KeepsItAlsoWhereItIsWatchedFirst) {
   hang();
   manager_.watch();
   EXPECT_EQ(labels_.back().result, "aborted: another client has put the wind back");
+  manager_.onHang();
   expectTheUsersWindIsKept();
 }
 
@@ -333,7 +363,7 @@ TEST_F(DisturbanceManagerHang, KeepsItAlsoWhereItWasPutBackOnce) {
   fly(1.0);
   manager_.abort("stopped by /test");
   hang();
-  manager_.abort("tx_node hung");
+  manager_.onHang();
   expectTheUsersWindIsKept();
 }
 
@@ -342,7 +372,7 @@ TEST_F(DisturbanceManagerHang, PutsTheWeatherBackWhereTheGuardianHasNot) {
   EXPECT_EQ(manager_.begin(gust(), "/test"), "");
   fly(1.0);
   sim_.frame(3.0);
-  manager_.abort("tx_node hung");
+  manager_.onHang();
   EXPECT_EQ(weather(), before_);
   settle();
   EXPECT_TRUE(journal().empty());
@@ -356,7 +386,7 @@ TEST_F(DisturbanceManagerHang, PutsTheWeatherBackWhereFramesHaveChangedItSince) 
   fly(0.1);
   sim_.journal()->remove({journal()[0].id});  // the guardian is late
   fly(0.1);
-  manager_.abort("tx_node hung");
+  manager_.onHang();
   EXPECT_EQ(weather(), before_);
 }
 
