@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "xplane_bridge/core/base/thread_turns.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
 #include "xplane_bridge/core/simulator/simulator_settings.hpp"
 
@@ -26,8 +27,8 @@ std::vector<core::JournalEntry> ownPauses(const core::Journal& journal) {
 PauseOutcome setPaused(core::SimulatorPort* link, bool pause, double timeout_s, const std::function<bool()>& given_up,
                        const std::function<void()>& before) {
   // One after the other: two that read before either has toggled would toggle twice.
-  static std::mutex turn;
-  const std::lock_guard<std::mutex> lock(turn);
+  static core::TurnMutex turn;
+  const std::lock_guard<core::TurnMutex> lock(turn);
   // Read now: the link's own status may be a fifth of a second old, and a toggle on that would do the opposite.
   const auto shown = link->read({core::kPausedDataref}, timeout_s);
   if (shown.empty() || !shown.front()) return PauseOutcome::kUnknown;

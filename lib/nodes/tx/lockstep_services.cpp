@@ -1,6 +1,7 @@
 #include "xplane_bridge/nodes/tx/lockstep_services.hpp"
 
 #include <cstdint>
+#include <mutex>
 #include <utility>
 
 #include "xplane_bridge/nodes/base/service_result.hpp"
@@ -8,7 +9,7 @@
 namespace xplane_bridge {
 namespace {
 
-using Turn = std::lock_guard<std::mutex>;
+using Turn = std::lock_guard<core::TurnMutex>;
 
 constexpr double kFrameWait = 5.0;  // [s] without a frame in which X-Plane counts as standing
 constexpr const char* kNodeEnds = "tx_node ends";
@@ -56,8 +57,8 @@ void LockstepServices::stepInLockstep(const LockstepStep::Request& request, Lock
 }
 
 void LockstepServices::stepFreely(const LockstepStep::Request& request, LockstepStep::Response* response) {
-  const std::uint64_t before = actuation_.framesFlown();
-  const auto flown = [this, before] { return actuation_.framesFlown() - before; };
+  std::uint64_t before = 0;
+  const auto flown = [&] { return actuation_.framesFlown() - before; };
   std::string why_not;
   std::uint8_t code = ServiceResult::NO_LINK;
   const auto setPaused = [&](bool paused) {
@@ -69,7 +70,8 @@ void LockstepServices::stepFreely(const LockstepStep::Request& request, Lockstep
   std::uint64_t call = 0;
   {
     const Turn turn(turn_);
-    call = note(Asked::kStep);
+    call = note(request.frames > 0 ? Asked::kStep : Asked::kHold);
+    before = actuation_.framesFlown();
     if (request.frames > 0) setPaused(false);
   }
   const auto ends = [&] { return calls_ != call || ending_(); };
@@ -81,7 +83,7 @@ void LockstepServices::stepFreely(const LockstepStep::Request& request, Lockstep
     const Turn turn(turn_);
     if (calls_ != call && last_ != Asked::kHold) {
       code = ServiceResult::REFUSED;
-      why_not = "another lockstep/step or lockstep/run was called meanwhile: X-Plane flies on";
+      why_not = "another lockstep/step or lockstep/run has taken its place";
     } else if (ending_()) {
       why_not = kNodeEnds;  // who asked for the pause is not there to end it
     } else {

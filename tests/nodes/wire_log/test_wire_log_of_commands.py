@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import threading
 
 import pytest
 
@@ -189,3 +190,25 @@ def test_a_log_that_is_cut_off_replays_up_to_there(flight):
     assert "is cut off; the replay ends there" in done.stdout
     recorded = sent_in(OwnLog(cut))
     assert sent_in(OwnLog(log_of(folder, namespace, "tx_node", "cut_again")))[: len(recorded)] == recorded
+
+
+def test_hold_ends_a_step_also_where_the_threads_of_the_node_take_turns(world):
+    from std_srvs.srv import Trigger
+    from xplane_bridge.srv import LockstepStep
+
+    paused = "sim/time/paused"
+    world.xplane = world.emulator("--start", "air")
+    world.wire = WatchedDatarefs(world.xplane.port, paused)
+    world.set_param("wire_log", str(world.folder / "wire.pcapng"))
+    world.start("tx_node", tx_params())
+    wait_until(lambda: world.call("lockstep/hold", Trigger).success, WAIT_S, "pause")
+    world.wire.wait(paused, 1.0)
+    answers = []
+    frames = 1000000
+    step = threading.Thread(target=lambda: answers.append(world.call("lockstep/step", LockstepStep, frames=frames)))
+    step.start()
+    world.wire.wait(paused, 0.0)
+    assert world.call("lockstep/hold", Trigger).success
+    step.join(WAIT_S)
+    assert [answer.success for answer in answers] == [True]
+    world.wire.wait(paused, 1.0)

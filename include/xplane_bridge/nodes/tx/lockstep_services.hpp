@@ -3,11 +3,11 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <mutex>
 #include <string>
 
 #include "xplane_bridge/LockstepStep.h"
 #include "xplane_bridge/actuation/actuation.hpp"
+#include "xplane_bridge/core/base/thread_turns.hpp"
 #include "xplane_bridge/nodes/tx/tx_lockstep.hpp"
 
 namespace xplane_bridge {
@@ -40,7 +40,7 @@ class LockstepServices {
   const std::function<bool()> ending_;
   const std::string who_;
   // Without lock-step.
-  std::mutex turn_;  // of who pauses X-Plane or lets it go on; guards the following
+  core::TurnMutex turn_;  // of who pauses X-Plane or lets it go on; guards the following
   Asked last_ = Asked::kHold;
   std::atomic<std::uint64_t> calls_{0};  // read without turn_ as well
 };

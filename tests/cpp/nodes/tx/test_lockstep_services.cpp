@@ -141,7 +141,7 @@ TEST_F(FreeStepTest, RunEndsItAndIsNotPausedAfterwards) {
   const LockstepStep::Response response = step(1000000);
   EXPECT_FALSE(response.success);
   EXPECT_EQ(response.result.code, ServiceResult::REFUSED);
-  EXPECT_EQ(response.result.message, "another lockstep/step or lockstep/run was called meanwhile: X-Plane flies on");
+  EXPECT_EQ(response.result.message, "another lockstep/step or lockstep/run has taken its place");
   EXPECT_LT(response.flown, 20U);
   EXPECT_EQ(sim_.status().paused, false);
 }
