@@ -5,12 +5,11 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-import signal
 import tempfile
 import threading
 import time
 from contextlib import contextmanager
-from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Tuple
 
 from xplane_bridge.campaign.definition import Campaign, parse_campaign
 from xplane_bridge.campaign.distributions import CampaignError
@@ -24,13 +23,28 @@ _FIRST_WORKER_S = 30.0
 #: A local cluster without any worker for so long gets new ones: Dask starts a worker that dies again, but on a busy
 #: machine gives up one that dies while it starts, and its flights would wait for ever.
 _EMPTY_S, _LOOK_S = 30.0, 1.0
+#: What Dask runs in each worker of a local cluster as it starts: Ctrl-C in a terminal is for the parent alone. It is no
+#: module, which would import all: a first flight could then end its worker before Dask has noted that the worker runs.
+_WORKERS_START = """
+import signal
+
+
+def dask_setup(worker):
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+"""
 
 
 class Cluster:
-    """An executor of `runner.CampaignFolder.fly`."""
+    """An executor of `runner.CampaignFolder.fly`.
 
-    def __init__(self, client: Any) -> None:
+    Args:
+        client: Of Dask.
+        replaced: Gives how often all workers were replaced until now.
+    """
+
+    def __init__(self, client: Any, replaced: Callable[[], int] = lambda: 0) -> None:
         self._client = client
+        self._replaced = replaced
         self._address = str(client.scheduler.address)
         self._flies: Optional[Campaign] = None
         self._flies_with: Fingerprint = {}
@@ -93,11 +107,22 @@ class Cluster:
         for first, count in sorted(suspects):
             rows: List[Row] = []
             for flight in range(first, first + count):
-                try:
-                    rows += self._submit(campaign, flight, 1).result()
-                except KilledWorker:
-                    rows.append(dead_row(campaign, flight))
+                rows += self._fly_alone(campaign, flight)
             yield rows
+
+    def _fly_alone(self, campaign: Campaign, flight: int) -> List[Row]:
+        """Once more where all workers were replaced meanwhile: that takes the worker of a sound flight, too."""
+        from distributed import KilledWorker
+
+        for last in (False, True):
+            replaced = self._replaced()
+            try:
+                rows: List[Row] = self._submit(campaign, flight, 1).result()
+                return rows
+            except KilledWorker:
+                if last or self._replaced() == replaced:
+                    break
+        return [dead_row(campaign, flight)]
 
     def worker_pids(self) -> List[int]:
         """Process ids of the workers of a local cluster."""
@@ -134,11 +159,6 @@ def _refuse_another(worker: str, has: Fingerprint, wanted: Fingerprint) -> None:
         )
 
 
-def dask_setup(_worker: Any) -> None:
-    """What Dask runs in each worker of a local cluster as it starts: Ctrl-C in a terminal is for the parent alone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
 @contextmanager
 def local_cluster(workers: int) -> Iterator[Cluster]:
     """Processes of this machine, one thread each: two flights in one process would only wait for each other."""
@@ -156,23 +176,29 @@ def local_cluster(workers: int) -> Iterator[Cluster]:
         host="127.0.0.1",
         local_directory=scratch,
         silence_logs=logging.CRITICAL,
-        preload=[__name__],
+        preload=[_WORKERS_START],
     ) as cluster, Client(cluster) as client:
-        over = threading.Event()
-        threading.Thread(target=_replenish, args=(cluster, workers, over), name="workers", daemon=True).start()
+        over, replacements = threading.Event(), _Replacements()
+        arguments = (cluster, workers, over, replacements)
+        threading.Thread(target=_replenish, args=arguments, name="workers", daemon=True).start()
         try:
-            yield Cluster(client)
+            yield Cluster(client, lambda: replacements.count)
         finally:
             over.set()
 
 
-def _replenish(cluster: Any, workers: int, over: threading.Event) -> None:
+class _Replacements:
+    count = 0
+
+
+def _replenish(cluster: Any, workers: int, over: threading.Event, replacements: _Replacements) -> None:
     """Starts all workers anew where none has been left for a while, which is longer each time: they may be slow."""
     seen, patience_s = time.monotonic(), _EMPTY_S
     while not over.wait(_LOOK_S):
         if cluster.scheduler.workers:
             seen, patience_s = time.monotonic(), _EMPTY_S
         elif time.monotonic() - seen > patience_s:
+            replacements.count += 1
             cluster.scale(0)
             cluster.scale(workers)
             seen, patience_s = time.monotonic(), 2.0 * patience_s

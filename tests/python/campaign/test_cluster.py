@@ -1,4 +1,4 @@
-"""Ctrl-C with a cluster of this machine's processes, which the terminal sends to all of them."""
+"""A cluster of this machine's processes: Ctrl-C, which the terminal sends to all of them, and workers that are lost."""
 
 from __future__ import annotations
 
@@ -7,12 +7,17 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+import yaml
 
 from support.deadlines import PROGRAM_S
-from xplane_bridge.campaign.cluster import local_cluster
+from xplane_bridge.campaign.cluster import Cluster, local_cluster
+from xplane_bridge.campaign.definition import parse_campaign
 
 RUN = "import sys; from xplane_bridge.cli.run_campaign import main; sys.exit(main())"
 #: Many flights of a tenth of a second.
@@ -73,3 +78,31 @@ def test_a_worker_that_was_started_anew_ignores_ctrl_c_too() -> None:
             time.sleep(0.05)
         (handler,) = client.run(signal.getsignal, signal.SIGINT).values()
         assert handler == signal.SIG_IGN
+
+
+@pytest.mark.parametrize(("replacements", "lost", "flown"), [(0, 1, False), (1, 1, True), (2, 2, False)])
+def test_a_flight_whose_worker_was_replaced_is_flown_again(replacements: int, lost: int, flown: bool) -> None:
+    """Replacing all workers takes that of a sound flight, too."""
+    distributed = pytest.importorskip("distributed")
+    campaign = parse_campaign(yaml.safe_load(CAMPAIGN))
+    replaced = [0]
+
+    class Client:
+        scheduler = SimpleNamespace(address="")
+        asked = 0
+
+        def submit(self, *_: Any, **__: Any) -> Any:
+            self.asked += 1
+            return SimpleNamespace(result=partial(self.result, self.asked))
+
+        @staticmethod
+        def result(asked: int) -> Any:
+            if asked > lost:
+                return [{"outcome": "flown"}]
+            replaced[0] += asked <= replacements
+            raise distributed.KilledWorker("task", None, 1)
+
+    client = Client()
+    ((row),) = Cluster(client, lambda: replaced[0])._fly_alone(campaign, 1)
+    assert (row["outcome"] == "flown") == flown
+    assert client.asked == 1 + (replacements > 0)

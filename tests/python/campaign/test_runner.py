@@ -164,9 +164,11 @@ def test_workers_that_start_slowly_have_more_time_each_time(monkeypatch: pytest.
     monkeypatch.setattr(cluster_module, "_EMPTY_S", 0.05)
     monkeypatch.setattr(cluster_module, "_LOOK_S", 0.01)
     slow, began_s = SlowCluster(starts=4), time.monotonic()
-    cluster_module._replenish(slow, 2, slow.over)
+    replacements = cluster_module._Replacements()
+    cluster_module._replenish(slow, 2, slow.over, replacements)
     waits = [after - before for before, after in zip([began_s, *slow.begun_s], slow.begun_s)]
     assert [wait > 0.05 * 2**number for number, wait in enumerate(waits)] == [True] * 4, waits
+    assert replacements.count == 4
 
 
 def deadly(state: Any) -> dict:
