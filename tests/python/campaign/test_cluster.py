@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -16,6 +17,7 @@ import pytest
 import yaml
 
 from support.deadlines import PROGRAM_S
+from support.process_tree import alive, descendants
 from xplane_bridge.campaign.cluster import Cluster, local_cluster
 from xplane_bridge.campaign.definition import parse_campaign
 
@@ -33,15 +35,6 @@ scenario:
 """
 
 
-def alive(group: int) -> bool:
-    """Whether a process of it runs."""
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
 @pytest.mark.parametrize("to_all", [True, False])
 def test_ctrl_c_ends_all_without_a_word_of_the_workers(tmp_path: Path, to_all: bool) -> None:
     pytest.importorskip("distributed")
@@ -55,13 +48,15 @@ def test_ctrl_c_ends_all_without_a_word_of_the_workers(tmp_path: Path, to_all: b
             assert program.poll() is None
             assert time.monotonic() < deadline
             time.sleep(0.05)
+        below = descendants(program.pid)
+        assert len(below) >= 2
         (os.killpg if to_all else os.kill)(program.pid, signal.SIGINT)
         assert program.wait(PROGRAM_S) == 130
-        while alive(program.pid):
+        while any(map(alive, below)):
             assert time.monotonic() < deadline
             time.sleep(0.05)
     finally:
-        if alive(program.pid):
+        with contextlib.suppress(ProcessLookupError):
             os.killpg(program.pid, signal.SIGKILL)
     assert "Traceback" not in (tmp_path / "log").read_text()
 
