@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 from contextlib import contextmanager
-from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 from xplane_bridge.campaign.definition import Campaign, parse_campaign
 from xplane_bridge.campaign.distributions import CampaignError
@@ -37,14 +37,13 @@ def dask_setup(worker):
 class Cluster:
     """An executor of `runner.CampaignFolder.fly`.
 
-    Args:
-        client: Of Dask.
-        replaced: Gives how often all workers were replaced until now.
+    Attributes:
+        replacements: How often all workers were replaced until now.
     """
 
-    def __init__(self, client: Any, replaced: Callable[[], int] = lambda: 0) -> None:
+    def __init__(self, client: Any) -> None:
+        self.replacements = 0
         self._client = client
-        self._replaced = replaced
         self._address = str(client.scheduler.address)
         self._flies: Optional[Campaign] = None
         self._flies_with: Fingerprint = {}
@@ -115,12 +114,12 @@ class Cluster:
         from distributed import KilledWorker
 
         for last in (False, True):
-            replaced = self._replaced()
+            before = self.replacements
             try:
                 rows: List[Row] = self._submit(campaign, flight, 1).result()
                 return rows
             except KilledWorker:
-                if last or self._replaced() == replaced:
+                if last or self.replacements == before:
                     break
         return [dead_row(campaign, flight)]
 
@@ -178,27 +177,23 @@ def local_cluster(workers: int) -> Iterator[Cluster]:
         silence_logs=logging.CRITICAL,
         preload=[_WORKERS_START],
     ) as cluster, Client(cluster) as client:
-        over, replacements = threading.Event(), _Replacements()
-        arguments = (cluster, workers, over, replacements)
+        over, flies = threading.Event(), Cluster(client)
+        arguments = (cluster, workers, over, flies)
         threading.Thread(target=_replenish, args=arguments, name="workers", daemon=True).start()
         try:
-            yield Cluster(client, lambda: replacements.count)
+            yield flies
         finally:
             over.set()
 
 
-class _Replacements:
-    count = 0
-
-
-def _replenish(cluster: Any, workers: int, over: threading.Event, replacements: _Replacements) -> None:
+def _replenish(cluster: Any, workers: int, over: threading.Event, flies: Cluster) -> None:
     """Starts all workers anew where none has been left for a while, which is longer each time: they may be slow."""
     seen, patience_s = time.monotonic(), _EMPTY_S
     while not over.wait(_LOOK_S):
         if cluster.scheduler.workers:
             seen, patience_s = time.monotonic(), _EMPTY_S
         elif time.monotonic() - seen > patience_s:
-            replacements.count += 1
+            flies.replacements += 1
             cluster.scale(0)
             cluster.scale(workers)
             seen, patience_s = time.monotonic(), 2.0 * patience_s

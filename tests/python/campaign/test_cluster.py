@@ -80,7 +80,6 @@ def test_a_flight_whose_worker_was_replaced_is_flown_again(replacements: int, lo
     """Replacing all workers takes that of a sound flight, too."""
     distributed = pytest.importorskip("distributed")
     campaign = parse_campaign(yaml.safe_load(CAMPAIGN))
-    replaced = [0]
 
     class Client:
         scheduler = SimpleNamespace(address="")
@@ -94,10 +93,11 @@ def test_a_flight_whose_worker_was_replaced_is_flown_again(replacements: int, lo
         def result(asked: int) -> Any:
             if asked > lost:
                 return [{"outcome": "flown"}]
-            replaced[0] += asked <= replacements
+            flies.replacements += asked <= replacements
             raise distributed.KilledWorker("task", None, 1)
 
     client = Client()
-    ((row),) = Cluster(client, lambda: replaced[0])._fly_alone(campaign, 1)
+    flies = Cluster(client)
+    (row,) = flies._fly_alone(campaign, 1)
     assert (row["outcome"] == "flown") == flown
     assert client.asked == 1 + (replacements > 0)

@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Iterator, List
 
 import jsbsim
@@ -164,11 +165,11 @@ def test_workers_that_start_slowly_have_more_time_each_time(monkeypatch: pytest.
     monkeypatch.setattr(cluster_module, "_EMPTY_S", 0.05)
     monkeypatch.setattr(cluster_module, "_LOOK_S", 0.01)
     slow, began_s = SlowCluster(starts=4), time.monotonic()
-    replacements = cluster_module._Replacements()
-    cluster_module._replenish(slow, 2, slow.over, replacements)
+    flies = Cluster(SimpleNamespace(scheduler=SimpleNamespace(address="")))
+    cluster_module._replenish(slow, 2, slow.over, flies)
     waits = [after - before for before, after in zip([began_s, *slow.begun_s], slow.begun_s)]
     assert [wait > 0.05 * 2**number for number, wait in enumerate(waits)] == [True] * 4, waits
-    assert replacements.count == 4
+    assert flies.replacements == 4
 
 
 def deadly(state: Any) -> dict:
