@@ -6,7 +6,6 @@ import dataclasses
 
 from xplane_bridge.emulator.emulator import Emulator
 from xplane_bridge.emulator.flight.flight_model import FlightModel
-from xplane_bridge.emulator.flight.frame import PA_TO_INHG
 from xplane_bridge.emulator.options import Options
 from xplane_bridge.emulator.simulator import Simulator
 from xplane_bridge.in_process.aircraft import Conditions, initial_state
@@ -55,16 +54,5 @@ class ConditionedEmulator(Emulator):
     def _new_simulator(self) -> Simulator:
         simulator = super()._new_simulator()
         self._conditions.disturb(simulator.model)
-        self._show_air(simulator)
+        simulator.settings.show_air(*self._conditions.air)
         return simulator
-
-    def _show_air(self, simulator: Simulator) -> None:
-        """The air that the flight began in, as clients read it, who may then change one number of it."""
-        offset_k, pressure_pa = simulator.settings.weather.air = self._conditions.air
-        for name, value in (
-            ("sim/weather/barometer_sealevel_inhg", pressure_pa * PA_TO_INHG),
-            ("sim/weather/region/sealevel_pressure_pas", pressure_pa),
-            ("sim/weather/temperature_sealevel_c", 15.0 + offset_k),
-            ("sim/weather/region/sealevel_temperature_c", 15.0 + offset_k),
-        ):
-            simulator.store.set(name, value)

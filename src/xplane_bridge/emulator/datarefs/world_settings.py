@@ -24,6 +24,11 @@ _MAX_LOAD_KG = 5000.0
 _STATIONS = 9
 _SEA_LEVEL = "sim/weather/barometer_sealevel_inhg"
 _SEA_LEVEL_TEMPERATURE = "sim/weather/temperature_sealevel_c"
+#: 12 has the sea level's air by two names, one of them in another unit: times so much.
+_TWICE_NAMED = (
+    (_SEA_LEVEL, "sim/weather/region/sealevel_pressure_pas", INHG_PA),
+    (_SEA_LEVEL_TEMPERATURE, "sim/weather/region/sealevel_temperature_c", 1.0),
+)
 #: Where the centre of gravity is set: by the first of these that the version has.
 #: Of the centre of gravity, aft: without fuel; with it.
 DRY_CG, LOADED_CG = "sim/flightmodel/misc/cgz_ref_to_default", "sim/flightmodel2/misc/cg_offset_z"
@@ -65,11 +70,7 @@ class WorldSettings:
         store.on_write(DRY_CG, lambda _, value: self._model().set_loading(cg_aft_m=value))
         store.on_write(LOADED_CG, self._set_balance)
         store.on_write("sim/time/local_date_days", lambda _i, value: setattr(clocks, "date_days", int(value)))
-        # 12 has the sea level's air by two names, one of them in another unit
-        for name, region, factor in (
-            (_SEA_LEVEL, "sim/weather/region/sealevel_pressure_pas", INHG_PA),
-            (_SEA_LEVEL_TEMPERATURE, "sim/weather/region/sealevel_temperature_c", 1.0),
-        ):
+        for name, region, factor in _TWICE_NAMED:
             store.on_write(name, partial(lambda to, k, _, value: self._set_atmosphere(to, value * k), region, factor))
             store.on_write(region, partial(lambda to, k, _, value: self._set_atmosphere(to, value / k), name, factor))
         if not store.dataref("sim/weather/region/wind_speed_msc").visible:
@@ -113,6 +114,18 @@ class WorldSettings:
         self._store.set(direction, weather.wind_from_deg)
         self._store.set(speed, weather.wind_mps / factor)
         self._store.set(turbulence, weather.turbulence_mps / TURBULENCE_MPS_PER_UNIT)
+
+    def show_air(self, offset_k: float, pressure_pa: float) -> None:
+        """Shows the air that the aircraft was put into, of which clients may then change one number.
+
+        Args:
+            offset_k: Difference from the standard temperature.
+            pressure_pa: At sea level.
+        """
+        self.weather.air = offset_k, pressure_pa
+        for (name, region, factor), value in zip(_TWICE_NAMED, (pressure_pa, 15.0 + offset_k)):
+            self._store.set(name, value / factor)
+            self._store.set(region, value)
 
     def _set_fuel(self, tank: int, value: float) -> None:
         tanks = self._model().info.tank_count
