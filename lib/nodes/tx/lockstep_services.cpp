@@ -30,13 +30,13 @@ std::string LockstepServices::setRunning(bool running) {
     return "";
   }
   const Turn turn(turn_);
-  note(running ? Asked::kRun : Asked::kHold);
+  note(!running);
   const RequestResult result = actuation_.setPaused(!running, who_);
   return result.success() ? "" : result.text;
 }
 
-std::uint64_t LockstepServices::note(Asked what) {
-  last_ = what;
+std::uint64_t LockstepServices::note(bool holds) {
+  last_holds_ = holds;
   return ++calls_;
 }
 
@@ -70,7 +70,7 @@ void LockstepServices::stepFreely(const LockstepStep::Request& request, Lockstep
   std::uint64_t call = 0;
   {
     const Turn turn(turn_);
-    call = note(request.frames > 0 ? Asked::kStep : Asked::kHold);
+    call = note(request.frames == 0);
     before = actuation_.framesFlown();
     if (request.frames > 0) setPaused(false);
   }
@@ -81,7 +81,7 @@ void LockstepServices::stepFreely(const LockstepStep::Request& request, Lockstep
   }
   {
     const Turn turn(turn_);
-    if (calls_ != call && last_ != Asked::kHold) {
+    if (calls_ != call && !last_holds_) {
       code = ServiceResult::REFUSED;
       why_not = "another lockstep/step or lockstep/run has taken its place";
     } else if (ending_()) {

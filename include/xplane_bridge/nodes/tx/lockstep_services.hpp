@@ -27,10 +27,8 @@ class LockstepServices {
   std::string setRunning(bool running);
 
  private:
-  enum class Asked : std::uint8_t { kStep, kRun, kHold };
-
   /// Without lock-step; `turn_` is held. @return number of the call
-  std::uint64_t note(Asked what);
+  std::uint64_t note(bool holds);
   void stepInLockstep(const LockstepStep::Request& request, LockstepStep::Response* response);
   void stepFreely(const LockstepStep::Request& request, LockstepStep::Response* response);
 
@@ -40,8 +38,8 @@ class LockstepServices {
   const std::function<bool()> ending_;
   const std::string who_;
   // Without lock-step.
-  core::TurnMutex turn_;  // of who pauses X-Plane or lets it go on; guards the following
-  Asked last_ = Asked::kHold;
+  core::TurnMutex turn_;                 // of who pauses X-Plane or lets it go on; guards the following
+  bool last_holds_ = true;               // the last call
   std::atomic<std::uint64_t> calls_{0};  // read without turn_ as well
 };
 

@@ -72,7 +72,8 @@ class TxNode : public BaseNode {
   ros::Publisher frame_mode_publisher_;    // in lock-step
   std::optional<ControlMode> frame_mode_;  // to be published at the frame's end
   ServiceThreads mode_threads_{1};         // a pilot's wish does not wait for what X-Plane has not shown yet
-  // lockstep/step waits for frames, which wait for other services. However many wait, run and hold end them.
+  // lockstep/step waits for frames, which wait for other services. However many wait, run and hold are heard, and end
+  // those under way.
   ServiceThreads step_threads_{2};
   ServiceThreads hold_threads_{1};
   TxPublishers publishers_;

@@ -46,6 +46,12 @@ class DisturbanceManagerTest : public testing::Test {
       manager_.onFrame(watch_);
     }
   }
+  /// A second of it.
+  void flyGust() {
+    begin();
+    EXPECT_EQ(manager_.begin(gust(), "/test"), "");
+    fly(1.0);
+  }
   /// Until the weather has been put back for good.
   void settle() {
     fly(1.1);
@@ -280,9 +286,7 @@ TEST_F(DisturbanceManagerTest, EndsWhenAnotherClientHasPutTheWindBack) {
 }
 
 TEST_F(DisturbanceManagerTest, KeepsAWindThatIsSetWhereNoFrameHasChangedItSinceItWasPutBack) {
-  begin();
-  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
-  fly(1.0);
+  flyGust();
   manager_.watch();  // the entry is there, and X-Plane is paused from here on
   sim_.journal()->remove({journal()[0].id});
   sim_.set(kSpeed11, 40.0F);
@@ -295,9 +299,7 @@ TEST_F(DisturbanceManagerTest, KeepsAWindThatIsSetWhereNoFrameHasChangedItSinceI
 }
 
 TEST_F(DisturbanceManagerTest, PutsTheWeatherBackWhereAHitchHidesThatFramesHaveChangedIt) {
-  begin();
-  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
-  fly(1.0);
+  flyGust();
   sim_.journal()->remove({journal()[0].id});
   fly(0.2);
   sim_.frame(0.6);
@@ -326,9 +328,7 @@ class DisturbanceManagerHang : public DisturbanceManagerTest {
 };
 
 TEST_F(DisturbanceManagerHang, KeepsTheWindThatWasSetAfterTheGuardianHasPutItBack) {
-  begin();
-  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
-  fly(1.0);
+  flyGust();
   hang();
   manager_.onHang();
   EXPECT_EQ(labels_.back().result, "aborted: tx_node hung");
@@ -336,9 +336,7 @@ TEST_F(DisturbanceManagerHang, KeepsTheWindThatWasSetAfterTheGuardianHasPutItBac
 }
 
 TEST_F(DisturbanceManagerHang, KeepsItAlsoWhereAFrameComesFirst) {
-  begin();
-  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
-  fly(1.0);
+  flyGust();
   hang();
   fly(0.1);
   EXPECT_EQ(labels_.back().result, "aborted: another client has put the wind back");
@@ -347,9 +345,7 @@ TEST_F(DisturbanceManagerHang, KeepsItAlsoWhereAFrameComesFirst) {
 }
 
 TEST_F(DisturbanceManagerHang, KeepsItAlsoWhereItIsWatchedFirst) {
-  begin();
-  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
-  fly(1.0);
+  flyGust();
   hang();
   manager_.watch();
   EXPECT_EQ(labels_.back().result, "aborted: another client has put the wind back");
@@ -358,9 +354,7 @@ TEST_F(DisturbanceManagerHang, KeepsItAlsoWhereItIsWatchedFirst) {
 }
 
 TEST_F(DisturbanceManagerHang, KeepsItAlsoWhereItWasPutBackOnce) {
-  begin();
-  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
-  fly(1.0);
+  flyGust();
   manager_.abort("stopped by /test");
   hang();
   manager_.onHang();
@@ -368,9 +362,7 @@ TEST_F(DisturbanceManagerHang, KeepsItAlsoWhereItWasPutBackOnce) {
 }
 
 TEST_F(DisturbanceManagerHang, PutsTheWeatherBackWhereTheGuardianHasNot) {
-  begin();
-  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
-  fly(1.0);
+  flyGust();
   sim_.frame(3.0);
   manager_.onHang();
   EXPECT_EQ(weather(), before_);
@@ -379,9 +371,7 @@ TEST_F(DisturbanceManagerHang, PutsTheWeatherBackWhereTheGuardianHasNot) {
 }
 
 TEST_F(DisturbanceManagerHang, PutsTheWeatherBackWhereFramesHaveChangedItSince) {
-  begin();
-  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
-  fly(1.0);
+  flyGust();
   sim_.frame(1.0);
   fly(0.1);
   sim_.journal()->remove({journal()[0].id});  // the guardian is late
