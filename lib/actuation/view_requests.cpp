@@ -80,7 +80,7 @@ RequestResult ViewRequests::setView(const core::ViewWish& wish, const std::strin
 
 RequestResult ViewRequests::setViewLocked(const core::ViewWish& wish) {
   if (!isUp(link_->status())) return noLink();
-  const std::string problem = remember();
+  const std::string problem = remember(wish.field_of_view_deg != 0.0);
   if (!problem.empty()) return {ResultCode::kTimeout, problem};
   const Eigen::Quaterniond wanted = core::orientationOf(wish);
   std::optional<Shown> shown;
@@ -99,7 +99,7 @@ RequestResult ViewRequests::setViewLocked(const core::ViewWish& wish) {
                 : "X-Plane does not say where its camera is; given back"};
 }
 
-std::string ViewRequests::remember() {
+std::string ViewRequests::remember(bool field_of_view) {
   const auto journal = link_->journal();
   if (!journal) return "there is no journal yet, so that nothing is changed: try again in a second";
   const std::vector<std::string>& camera = core::cameraDatarefs();
@@ -111,23 +111,31 @@ std::string ViewRequests::remember() {
   const auto shown = measured(filled(camera, now));
   if (!shown) return "X-Plane does not say where its camera is (sim/graphics/view/view_*)";
   if (!core::ownEntry(*journal, kEntry)) before_.clear();
-  if (!before_.empty()) return "";
-  std::vector<std::string> changed = core::viewDatarefs();
-  changed.emplace_back(core::kFieldOfViewDataref);
+  std::vector<std::string> changed;
+  if (before_.empty()) changed = core::viewDatarefs();
+  if (field_of_view && before_.count(core::kFieldOfViewDataref) == 0) {
+    changed.emplace_back(core::kFieldOfViewDataref);
+  }
+  if (changed.empty()) return "";
   const auto values = link_->read(changed, kViewReadWait);
+  const std::vector<core::JournalEntry> entries = journal->entries();
+  std::map<std::string, float> found;
   std::vector<std::string> unknown;
   for (std::size_t i = 0; i < changed.size(); ++i) {
     if (values[i] && std::isfinite(*values[i])) {
-      before_[changed[i]] = *values[i];
+      // The field of view may be capture_node's, and its steps while it measures a delay.
+      found[changed[i]] = core::valueBefore(entries, changed[i]).value_or(*values[i]);
     } else {
       unknown.push_back(changed[i]);
     }
   }
-  view_before_ = shown->first;
-  if (unknown.empty()) return "";
-  before_.clear();
-  return "X-Plane does not report " + core::join(unknown) + ", which could not be given back" +
-         linkCondition(link_->status());
+  if (!unknown.empty()) {
+    return "X-Plane does not report " + core::join(unknown) + ", which could not be given back" +
+           linkCondition(link_->status());
+  }
+  if (before_.empty()) view_before_ = shown->first;
+  before_.merge(found);
+  return "";
 }
 
 void ViewRequests::takeOver(const std::vector<core::DatarefWrite>& writes) {
@@ -194,7 +202,7 @@ bool ViewRequests::giveBackLocked(double timeout_s) {
   if (!entry) return true;
   const std::string command = core::commandOf(view_before_);
   if (!command.empty()) link_->command(command);
-  if (link_->undo(entry->undo, timeout_s)) {
+  if (link_->undo(journal->handOver(kEntry), timeout_s)) {
     journal->removeUndone({*entry});
     return true;
   }

@@ -28,7 +28,8 @@ class ViewRequests {
   /// changed is given back.
   /// @param who asks for it
   RequestResult setView(const core::ViewWish& wish, const std::string& who);
-  /// Brings back what the first setView() found. Returns whether X-Plane shows it, or nothing was changed.
+  /// Brings back what the first setView() found, but what another node has changed too and still holds: the last one
+  /// gives that back. Returns whether X-Plane shows it, or nothing was changed.
   bool giveBack(double timeout_s);
   /// X-Plane is another one, whose view is its own user's: nothing of the last one's comes back. Waits for the
   /// journal's disk only.
@@ -42,8 +43,9 @@ class ViewRequests {
   };
 
   RequestResult setViewLocked(const core::ViewWish& wish);
-  /// Writes down what is to be changed, as it is now. @return why it cannot be; empty: it was
-  std::string remember();
+  /// Writes down what is to be changed and was not before, as it is now or, where another node has changed it, was
+  /// before that. @param field_of_view it is to be changed, too @return why it cannot be; empty: it was
+  std::string remember(bool field_of_view);
   void takeOver(const std::vector<core::DatarefWrite>& writes);
   /// @return what is measured in the end, and whether that is what was wanted
   std::pair<bool, std::optional<Shown>> tryWay(const core::ViewWay& way, const Eigen::Quaterniond& wanted);
@@ -53,7 +55,7 @@ class ViewRequests {
   core::SimulatorPort* link_;
   Report report_;
   core::TurnMutex mutex_;                // held while waiting for X-Plane
-  std::map<std::string, float> before_;  // as the first setView() found it
+  std::map<std::string, float> before_;  // as the first setView() that changes it found it
   int view_before_ = 0;
   std::vector<std::string> answered_;  // of core::cameraDatarefs()
 };

@@ -407,6 +407,35 @@ std::vector<JournalEntry> Journal::orphans(const std::string& purpose) const {
               found.end());
   return found;
 }
+std::vector<UndoOperation> Journal::handOver(const std::string& id) {
+  const auto is_own = [&](const JournalEntry& each) { return each.id == id && each.owner == self_; };
+  std::vector<JournalEntry> entries = this->entries();
+  const auto is_shared = [&](const UndoOperation& operation) {
+    const auto* dref = std::get_if<UndoDref>(&operation);
+    return dref != nullptr && std::any_of(entries.begin(), entries.end(), [&](const JournalEntry& each) {
+             return each.owner != self_ && valueBefore({each}, dref->path) && alive_(each.owner);
+           });
+  };
+  auto own = std::find_if(entries.begin(), entries.end(), is_own);
+  if (own == entries.end() || std::none_of(own->undo.begin(), own->undo.end(), is_shared)) {
+    return own == entries.end() ? std::vector<UndoOperation>() : own->undo;
+  }
+  const Lock lock(path_, waits_);
+  entries = read(path_);
+  own = std::find_if(entries.begin(), entries.end(), is_own);
+  if (own == entries.end()) {
+    return {};
+  }
+  std::vector<UndoOperation> left = own->undo;
+  left.erase(std::remove_if(left.begin(), left.end(), is_shared), left.end());
+  own->undo = left;
+  if (left.empty()) {
+    entries.erase(own);
+  }
+  write(path_, entries);
+  return left;
+}
+
 
 std::vector<JournalEntry> Journal::own() const {
   std::vector<JournalEntry> found = entries();

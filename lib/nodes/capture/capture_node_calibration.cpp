@@ -1,18 +1,18 @@
 /// CaptureNode measures the delay of the display, on request: steps of X-Plane's field of view, seen in the pictures.
 
-#include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <random>
 #include <stdexcept>
 
 #include <ros/master.h>
+#include <ros/names.h>
 #include <ros/this_node.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "xplane_bridge/nodes/capture/capture_node.hpp"
+#include "xplane_bridge/nodes/capture/picture_recorders.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -24,28 +24,6 @@ constexpr double kLongestStep = 0.3;
 constexpr double kUndoTimeout = 2.0;
 constexpr double kSenderAnswers = 30.0;  // with what it may have to wait for X-Plane to take its field of view back
 
-/// Whether a topic is one of these, or the same of another camera of the bridge, which shows the same X-Plane.
-bool sameBridges(const std::string& topic, const std::vector<std::string>& topics) {
-  return std::any_of(topics.begin(), topics.end(), [&topic](const std::string& own) {
-    const std::size_t camera = own.rfind("/camera/");
-    if (camera == std::string::npos || camera == 0) return topic == own;
-    const std::string space = own.substr(0, own.find('/', 1) + 1);  // "/xplane/"
-    const std::string tail = own.substr(camera);
-    return topic.compare(0, space.size(), space) == 0 && topic.size() >= tail.size() &&
-           topic.compare(topic.size() - tail.size(), tail.size(), tail) == 0;
-  });
-}
-
-/// Whether a node is a recorder, by its name alone: the master knows no more of it. rosbag's own is record_*, that of
-/// record.launch record; launch files have rosbag_record, flight_bag and the like. A garbage_detector is none.
-bool isRecorder(const std::string& node) {
-  std::string name = "_" + node.substr(node.rfind('/') + 1) + "_";
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  const auto has = [&name](const char* part) { return name.find(part) != std::string::npos; };
-  return (has("rosbag") || has("_bag_") || has("record")) && !has("record_watch");
-}
-
 /// Who records one of these topics, or of another camera's: a clause; empty: no node does.
 std::string recordingOf(const std::vector<std::string>& topics) {
   XmlRpc::XmlRpcValue request, response, state;
@@ -53,10 +31,12 @@ std::string recordingOf(const std::vector<std::string>& topics) {
   if (!ros::master::execute("getSystemState", request, response, state, false)) {
     return "the roscore does not say who records the pictures";
   }
+  // A further camera's states are those of its bridge, by a remapping.
+  const std::string bridge = ros::names::parentNamespace(ros::names::resolve("flight_state"));
   XmlRpc::XmlRpcValue& subscribers = state[1];
   for (int i = 0; i < subscribers.size(); ++i) {
     const std::string topic = subscribers[i][0];
-    if (!sameBridges(topic, topics)) continue;
+    if (!isOfBridge(topic, topics, bridge)) continue;
     XmlRpc::XmlRpcValue& nodes = subscribers[i][1];
     for (int k = 0; k < nodes.size(); ++k) {
       std::string node = nodes[k];
@@ -116,18 +96,7 @@ core::MeasuredDelay CaptureNode::calibrate() {
         "with window/change_detection none it is not known when the window changes: expected auto, damage or checksum");
   }
   refuseWhileRecorded();
-  double own = std::numeric_limits<double>::quiet_NaN();
-  {
-    const std::lock_guard<std::mutex> lock(camera_mutex_);
-    if (camera_known_) own = field_of_view_deg_;
-  }
-  if (!std::isfinite(own))
-    throw std::runtime_error("X-Plane does not say its field of view: is it heard (link_state)?");
-  if (!options_.set_field_of_view && !link().journal()->orphans(kFieldOfViewPurpose).empty()) {
-    throw std::runtime_error(
-        "the field of view that a killed node has left changed is not given back yet: call again, or run "
-        "release_overrides if that does not help");
-  }
+  const double own = fieldOfViewToChange();
   {
     const std::lock_guard<std::mutex> lock(capture_mutex_);
     if (!source_problem_.empty()) throw std::runtime_error("no picture: " + source_problem_);
@@ -156,6 +125,9 @@ core::MeasuredDelay CaptureNode::calibrate() {
 
 std::string CaptureNode::calibrateSender() {
   refuseWhileRecorded();
+  // Changed and given back by xplane_eye: in the journal, so that meanwhile no other node of this X-Plane takes a step
+  // for the user's own value, or measures as well.
+  const bool noted = noteFieldOfView(fieldOfViewToChange());
   calibrating_ = true;  // pictures of the steps are not published, and none for seconds is no frozen view
   const std::uint64_t number = sender_calibration_->ask();
   std::optional<vision::CalibrationAnswer> answer;
@@ -168,6 +140,11 @@ std::string CaptureNode::calibrateSender() {
     const std::lock_guard<std::mutex> lock(capture_mutex_);
     frozen_check_.pictureChanged(pairingNow());
     calibrating_ = false;
+  }
+  if (noted) {
+    // Not what the eye has seen before its steps, where the node that changed it has ended meanwhile.
+    const std::vector<core::UndoOperation> left = link().journal()->handOver(kFieldOfViewPurpose);
+    if (link().undo(left, kUndoTimeout)) link().journal()->remove({kFieldOfViewPurpose});
   }
   if (!answer.has_value()) {
     if (stopping()) throw std::runtime_error("the node is stopping");
@@ -186,6 +163,23 @@ void CaptureNode::refuseWhileRecorded() const {
   }
 }
 
+double CaptureNode::fieldOfViewToChange() {
+  double own = std::numeric_limits<double>::quiet_NaN();
+  {
+    const std::lock_guard<std::mutex> lock(camera_mutex_);
+    if (camera_known_) own = field_of_view_deg_;
+  }
+  if (!std::isfinite(own)) {
+    throw std::runtime_error("X-Plane does not say its field of view: is it heard (link_state)?");
+  }
+  if (!options_.set_field_of_view && !link().journal()->orphans(kFieldOfViewPurpose).empty()) {
+    throw std::runtime_error(
+        "the field of view that a killed node has left changed is not given back yet: call again, or run "
+        "release_overrides if that does not help");
+  }
+  return own;
+}
+
 std::string CaptureNode::stepFieldOfView(double own, double other) {
   const std::string& path = view_stream_.fieldOfViewDataref();
   std::mt19937 random{std::random_device{}()};
@@ -199,22 +193,28 @@ std::string CaptureNode::stepFieldOfView(double own, double other) {
   return wait(kSettle) ? "" : "the node is stopping";
 }
 
-bool CaptureNode::noteFieldOfView(double own) {
-  for (const core::JournalEntry& entry : link().journal()->own()) {
-    if (entry.purpose == kFieldOfViewPurpose) return false;  // the user's own is noted already
+bool CaptureNode::noteFieldOfView(double shown) {
+  if (core::ownEntry(*link().journal(), kFieldOfViewPurpose)) return false;  // the user's own is noted already
+  try {
+    recordFieldOfView(static_cast<float>(shown));
+  } catch (const core::JournalTakenError& error) {
+    throw std::runtime_error(std::string("another camera measures its delay, or has set_field_of_view: ") +
+                             error.what() + ", or call again when it has measured");
   }
-  const core::UndoDref undo{view_stream_.fieldOfViewDataref(), static_cast<float>(own)};
-  link().journal()->record(kFieldOfViewPurpose, kFieldOfViewPurpose, {undo});
   return true;
 }
 
 void CaptureNode::giveFieldOfViewBack(double own, bool noted) {
-  const core::UndoDref undo{view_stream_.fieldOfViewDataref(), static_cast<float>(own)};
-  if (!link().undo({undo}, kUndoTimeout)) {
-    throw std::runtime_error("X-Plane does not take its field of view of " + std::to_string(own) +
-                             " deg back; it stays noted for the node's end and the next start");
+  // What was seen before the steps is the user's own only where no other node had changed it, which may have ended.
+  std::vector<core::UndoOperation> back;
+  if (noted) back = link().journal()->handOver(kFieldOfViewPurpose);
+  const bool is_noted = !back.empty();
+  if (!is_noted) back.emplace_back(core::UndoDref{view_stream_.fieldOfViewDataref(), static_cast<float>(own)});
+  if (!link().undo(back, kUndoTimeout)) {
+    throw std::runtime_error(
+        "X-Plane does not take its field of view back; it stays noted for the node's end and the next start");
   }
-  if (noted) link().journal()->remove({kFieldOfViewPurpose});
+  if (is_noted) link().journal()->remove({kFieldOfViewPurpose});
 }
 
 void CaptureNode::lookForStep(vision::FrameSource* source, const vision::Change& change) {

@@ -123,21 +123,7 @@ void CaptureNode::changeFieldOfView() {
       return;
     }
     try {
-      const std::shared_ptr<core::Journal> journal = link().journal();
-      float before = *values.front();
-      // What a crashed run has left is not the user's own value; that is in the journal.
-      for (const core::JournalEntry& entry : journal->orphans(kFieldOfViewPurpose)) {
-        for (const core::UndoOperation& operation : entry.undo) {
-          if (const auto* dref = std::get_if<core::UndoDref>(&operation)) before = dref->value;
-        }
-      }
-      for (const core::JournalEntry& entry : journal->own()) {
-        if (entry.purpose != kFieldOfViewPurpose) continue;
-        for (const core::UndoOperation& operation : entry.undo) {
-          if (const auto* dref = std::get_if<core::UndoDref>(&operation)) before = dref->value;
-        }
-      }
-      journal->record(kFieldOfViewPurpose, kFieldOfViewPurpose, {core::UndoDref{path, before}});
+      recordFieldOfView(*values.front());
       link().write(path, static_cast<float>(options_.field_of_view_deg));
     } catch (const core::JournalError& error) {
       ROS_ERROR("X-Plane's field of view is left as it is, because it could not be restored later: %s", error.what());
@@ -145,13 +131,22 @@ void CaptureNode::changeFieldOfView() {
   });
 }
 
+void CaptureNode::recordFieldOfView(float shown) {
+  const std::shared_ptr<core::Journal> journal = link().journal();
+  const std::string& path = view_stream_.fieldOfViewDataref();
+  // What a crashed run has left, or tx_node's set_view has asked for, is not the user's own value.
+  const float before = core::valueBefore(journal->entries(), path).value_or(shown);
+  journal->record(kFieldOfViewPurpose, kFieldOfViewPurpose, {core::UndoDref{path, before}});
+}
+
 void CaptureNode::undo(const Deadline& deadline) {
-  if (!link().journal()) return;
+  const std::shared_ptr<core::Journal> journal = link().journal();
+  if (!journal) return;
   try {
-    for (const core::JournalEntry& entry : link().journal()->own()) {
-      if (entry.purpose != kFieldOfViewPurpose) continue;
-      if (link().undo(entry.undo, std::max(deadline.left(), 0.1))) link().journal()->remove({entry.id});
-    }
+    const auto entry = core::ownEntry(*journal, kFieldOfViewPurpose);
+    if (!entry) return;
+    const std::vector<core::UndoOperation> left = journal->handOver(entry->id);
+    if (link().undo(left, std::max(deadline.left(), 0.1))) journal->removeUndone({*entry});
   } catch (const core::JournalError& error) {
     ROS_ERROR("X-Plane's field of view may not be restored: %s", error.what());
   }

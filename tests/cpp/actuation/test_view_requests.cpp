@@ -165,6 +165,50 @@ TEST_F(ViewRequestsTest, WhatIsThereAfterAnotherHasGivenBackCounts) {
   EXPECT_EQ(sim_.value(kField), 75.0F);
 }
 
+TEST_F(ViewRequestsTest, TheFieldOfViewOfBeforeAnotherNodesChangeIsTheUsersOwn) {
+  sim_.journalOfAnother(true).record("field_of_view", "field_of_view", {core::UndoDref{kField, 72.0F}});
+  sim_.set(kField, 40.0F);  // capture_node's set_field_of_view
+  ASSERT_EQ(ask(ViewWish::kDown, 90.0).code, ResultCode::kOk);
+  sim_.journalOfAnother(true).remove({"field_of_view"});
+  EXPECT_TRUE(views_.giveBack(1.0));
+  EXPECT_EQ(sim_.value(kField), 72.0F);
+  EXPECT_TRUE(journalled().empty());
+}
+
+TEST_F(ViewRequestsTest, AFieldOfViewThatAnotherNodeStillHoldsIsLeftToIt) {
+  sim_.journalOfAnother(true).record("field_of_view", "field_of_view", {core::UndoDref{kField, 72.0F}});
+  sim_.set(kField, 40.0F);
+  sim_.set(kVertical, 2.0F);
+  ASSERT_EQ(ask(ViewWish::kDown, 90.0).code, ResultCode::kOk);
+  sim_.clearMessages();
+  EXPECT_TRUE(views_.giveBack(1.0));
+  EXPECT_EQ(sim_.value(kField), 90.0F);
+  EXPECT_EQ(sim_.value(kVertical), 2.0F) << "what it does not hold is given back";
+  ASSERT_EQ(journalled().size(), 1U);
+  EXPECT_EQ(journalled()[0].id, "field_of_view");
+}
+
+TEST_F(ViewRequestsTest, TheFieldOfViewIsReadWhenItIsFirstChanged) {
+  sim_.set(kField, 80.0F);  // a step of a calibration
+  ASSERT_EQ(ask(ViewWish::kDown).code, ResultCode::kOk);
+  sim_.set(kField, 72.0F);
+  ASSERT_EQ(ask(ViewWish::kDown, 60.0).code, ResultCode::kOk);
+  ASSERT_EQ(ask(ViewWish::kDown, 50.0).code, ResultCode::kOk);
+  EXPECT_TRUE(views_.giveBack(1.0));
+  EXPECT_EQ(sim_.value(kField), 72.0F);
+}
+
+TEST_F(ViewRequestsTest, AFieldOfViewThatDoesNotAnswerLeavesTheViewBeforeIt) {
+  ASSERT_EQ(ask(ViewWish::kDown).code, ResultCode::kOk);
+  sim_.set(kField, std::nanf(""));
+  const RequestResult result = ask(ViewWish::kRear, 60.0);
+  EXPECT_EQ(result.code, ResultCode::kTimeout);
+  EXPECT_EQ(result.text, "X-Plane does not report " + kField + ", which could not be given back");
+  EXPECT_EQ(sim_.value(kVertical), -90.0F);
+  EXPECT_TRUE(views_.giveBack(1.0));
+  EXPECT_EQ(sim_.value(kVertical), 0.0F);
+}
+
 TEST_F(ViewRequestsTest, AnotherXPlaneKeepsItsView) {
   ASSERT_EQ(ask(ViewWish::kDown, 90.0).code, ResultCode::kOk);
   views_.forget();

@@ -171,9 +171,14 @@ def check_exact(pairs: list, at_least: int) -> None:
 
 
 def calibrate(scene: Scene):
+    """The answer once capture_node hears X-Plane: until then it refuses."""
     from std_srvs.srv import Trigger
 
-    return scene.world.call("capture_node/calibrate_display_delay", Trigger)
+    def heard():
+        answer = scene.world.call("capture_node/calibrate_display_delay", Trigger)
+        return None if "X-Plane does not say its field of view" in answer.message else answer
+
+    return wait_until(heard, WAIT_S, "X-Plane heard by capture_node")
 
 
 def measure(scene: Scene) -> str:

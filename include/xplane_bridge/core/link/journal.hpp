@@ -125,6 +125,10 @@ class Journal {
   const std::string& path() const { return path_; }
   const JournalOwner& self() const { return self_; }
 
+  /// Takes out of this process's entry of that id the datarefs that entries of other processes hold which run: the last
+  /// of them gives them back. Under the lock, so that of two that end at once one does; without it where nothing is
+  /// shared. Returns what is left to be undone; empty: the entry is gone.
+  std::vector<UndoOperation> handOver(const std::string& id);
   /// The journal of subscriptions beside this one, "<file>_subscriptions.json": a process that gives overrides back
   /// never has to wait for a node that is writing down hundreds of datarefs, or was stopped in the middle of that.
   std::shared_ptr<Journal> ofSubscriptions() const;
@@ -158,6 +162,20 @@ class Journal {
   AliveFunction alive_;
   bool waits_;
 };
+
+/// What X-Plane had in a dataref before the first change of those that entries undo: the user's own value, which
+/// X-Plane does not show meanwhile. nullopt: none of them has changed it. Look at entries read after the dataref was.
+inline std::optional<float> valueBefore(const std::vector<JournalEntry>& entries, const std::string& dataref) {
+  for (const JournalEntry& entry : entries) {
+    for (const UndoOperation& operation : entry.undo) {
+      const auto* dref = std::get_if<UndoDref>(&operation);
+      if (dref != nullptr && dref->path == dataref) {
+        return dref->value;
+      }
+    }
+  }
+  return std::nullopt;
+}
 
 /// "<folder>/<host>_<port>.json" with characters that do not belong in a file name replaced by '-'.
 /// By convention the folder is ~/.ros/xplane_bridge.

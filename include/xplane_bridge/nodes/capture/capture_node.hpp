@@ -128,6 +128,8 @@ class CaptureNode : public BaseNode {
   void onLinkState(const core::LinkStatus& status);
   void onState(const FlightState::ConstPtr& state);
   void changeFieldOfView();
+  /// Writes the user's own field of view into the journal. @param shown [deg] by X-Plane, that where no entry has it
+  void recordFieldOfView(float shown);
 
   // Calibration: service's thread, but for lookForStep() (capture) and restoreFieldOfView() (timer).
   /// Who records the pictures, a clause; empty: no node does.
@@ -142,8 +144,11 @@ class CaptureNode : public BaseNode {
   void refuseWhileRecorded() const;
   /// @return why it did not come to its end; empty: it did
   std::string stepFieldOfView(double own, double other);
+  /// X-Plane's field of view as it shows it [deg]. @throws std::runtime_error where it may not be changed, with a
+  /// sentence for people
+  double fieldOfViewToChange();
   /// @return whether a new entry was made
-  bool noteFieldOfView(double own);
+  bool noteFieldOfView(double shown);
   void giveFieldOfViewBack(double own, bool noted);
   void lookForStep(vision::FrameSource* source, const vision::Change& change);
   /// What a killed node has left.

@@ -117,6 +117,42 @@ TEST_F(JournalTest, ReplacesById) {
   EXPECT_EQ(std::get<UndoDref>(entries[0].undo[0]).path, "other");
 }
 
+TEST_F(JournalTest, WhatTwoHoldIsGivenBackByTheLastOfThem) {
+  JournalOwner other = thisProcess("/tx");
+  other.pid = 1;
+  const auto of = [this](const JournalOwner& owner) {
+    return Journal(path_, owner, [](const JournalOwner&) { return true; });
+  };
+  Journal tx = of(other), capture = of(thisProcess("/capture"));
+  tx.record("view:camera", "override", {UndoDref{"offset", 2.0F}, UndoDref{"field_of_view", 72.0F}});
+  capture.record("field_of_view", "field_of_view", {UndoDref{"field_of_view", 72.0F}});
+  EXPECT_EQ(valueBefore(tx.entries(), "field_of_view"), 72.0F);
+  EXPECT_EQ(valueBefore(tx.entries(), "another"), std::nullopt);
+
+  const std::vector<UndoOperation> left = tx.handOver("view:camera");
+  ASSERT_EQ(left.size(), 1U);
+  EXPECT_EQ(std::get<UndoDref>(left[0]).path, "offset");
+  ASSERT_EQ(tx.own().size(), 1U);
+  EXPECT_EQ(tx.own()[0].undo.size(), 1U);
+  EXPECT_EQ(capture.handOver("field_of_view").size(), 1U) << "it is the last one";
+  EXPECT_EQ(capture.own().size(), 1U) << "to be removed once it is undone";
+  EXPECT_TRUE(capture.handOver("unknown").empty());
+}
+
+TEST_F(JournalTest, WhatIsHandedOverWholeLeavesNoEntry) {
+  JournalOwner other = thisProcess("/tx");
+  other.pid = 1;
+  const auto of = [this](const JournalOwner& owner, bool alive) {
+    return Journal(path_, owner, [alive](const JournalOwner&) { return alive; });
+  };
+  of(other, true).record("view:camera", "override", {UndoDref{"field_of_view", 72.0F}});
+  of(thisProcess("/capture"), true).record("field_of_view", "field_of_view", {UndoDref{"field_of_view", 72.0F}});
+  EXPECT_EQ(of(other, false).handOver("view:camera").size(), 1U) << "who crashed gives nothing back";
+  EXPECT_TRUE(of(other, true).handOver("view:camera").empty());
+  ASSERT_EQ(journal().entries().size(), 1U);
+  EXPECT_EQ(journal().entries()[0].id, "field_of_view");
+}
+
 TEST_F(JournalTest, FileGoesWithItsLastEntry) {
   journal().record("a", "override", kReleaseJoystick);
   journal().record("b", "override", kReleaseJoystick);
