@@ -7,6 +7,7 @@
 namespace xplane_bridge::core {
 namespace {
 
+constexpr double kSameShape = 0.01;  // of the aspect ratio: rounding to pixels, also of a sender that scales
 constexpr double kNarrowestDeg = 1.0, kWidestDeg = 170.0;
 
 bool isAngle(double degrees) { return degrees > kNarrowestDeg && degrees < kWidestDeg; }
@@ -41,7 +42,10 @@ bool agrees(const FrustumSample& sample, Frustum* frustum) {
 
 Frustum frustumOf(const FrustumSample& sample, double assumed_deg) {
   Frustum frustum;
-  if (sample.width > 0.0 && sample.height > 0.0) frustum.aspect = sample.width / sample.height;
+  if (sample.width > 0.0 && sample.height > 0.0) {
+    frustum.width = sample.width;
+    frustum.height = sample.height;
+  }
   frustum.known = isAngle(sample.horizontal_deg);
   frustum.horizontal_deg = frustum.known ? sample.horizontal_deg : assumed_deg;
   if (!frustum.known) return frustum;
@@ -52,6 +56,12 @@ Frustum frustumOf(const FrustumSample& sample, double assumed_deg) {
       sample.projection.allFinite() && sample.projection(0, 0) > 0.0 && sample.projection(1, 1) != 0.0;
   if (projects) frustum.known = agrees(sample, &frustum);
   return frustum;
+}
+
+bool canShowWhole(const Frustum& frustum, int width, int height, bool is_region) {
+  if (!(frustum.width > 0.0)) return true;
+  if (is_region) return width == frustum.width && height == frustum.height;
+  return std::abs(width * frustum.height / (height * frustum.width) - 1.0) <= kSameShape;
 }
 
 }  // namespace xplane_bridge::core

@@ -34,14 +34,6 @@ constexpr std::uint32_t kImageQueue = 2;
 // What counts as motion that a camera would show.
 constexpr double kMovedDeg = 0.05;
 constexpr double kMovedMetres = 0.2;
-constexpr double kSameShape = 0.01;  // of the aspect ratio: rounding to pixels, also of a sender that scales
-
-/// Whether a picture of this size [px] can be of the whole window that a frustum is of.
-bool hasShapeOf(const core::Frustum& frustum, cv::Size size) {
-  if (!(frustum.aspect > 0.0)) return true;
-  const double aspect = static_cast<double>(size.width) / size.height;
-  return std::abs(aspect / frustum.aspect - 1.0) <= kSameShape;
-}
 
 bool moved(const FlightState& from, const FlightState& to) {
   const auto turned = [](double a, double b) { return std::abs(std::remainder(b - a, 360.0)) > kMovedDeg; };
@@ -303,14 +295,17 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
   const sensor_msgs::CameraInfo info = cameraInfo(state.header, grabbed->size, shown);
   state.field_of_view_deg = static_cast<float>(scaler_->intrinsics(grabbed->size, shown).horizontal_fov_deg);
   // A sender or a video may stretch the window, and X-Plane's vertical angle with it.
-  const bool stretched = frustum.vertical_deg > 0.0 && options_.source != CaptureOptions::Source::kX11;
-  if (!stretched && !hasShapeOf(frustum, grabbed->size)) {
+  const bool of_screen = options_.source == CaptureOptions::Source::kX11;
+  const bool stretched = frustum.vertical_deg > 0.0 && !of_screen;
+  const bool is_region = of_screen && !options_.x11.region.empty();
+  if (!stretched && !core::canShowWhole(frustum, grabbed->size.width, grabbed->size.height, is_region)) {
     state.quality |= FrameState::QUALITY_FOV_ASSUMED;
     ROS_WARN_THROTTLE(
         60.0,
-        "pictures of %d x %d px do not have the shape of X-Plane's window, whose field of view camera_info "
-        "goes by: capture the whole window, or state the part's own (own_field_of_view, field_of_view_deg)",
-        grabbed->size.width, grabbed->size.height);
+        "pictures of %d x %d px do not have the %s of X-Plane's window (%.0f x %.0f px), whose field of view "
+        "camera_info goes by: capture the whole window, or state the part's own (own_field_of_view, "
+        "field_of_view_deg)",
+        grabbed->size.width, grabbed->size.height, is_region ? "size" : "shape", frustum.width, frustum.height);
   }
   const cv::Rect part = scaler_->shows(grabbed->size);
   state.picture_x = static_cast<std::uint32_t>(part.x);

@@ -24,7 +24,8 @@ struct Frustum {
   double vertical_deg = 0.0;    ///< from the lower edge to the upper one, before the shift; 0: pixels are square
   double shift_right = 0.0;     ///< [widths of the window] that the picture's middle lies right of the line of sight
   double shift_up = 0.0;        ///< [heights of the window] likewise, above it
-  double aspect = 0.0;          ///< width of the window over its height; 0: not known
+  double width = 0.0;           ///< [px] of the window; 0: not known
+  double height = 0.0;          ///< [px] likewise
   bool known = false;           ///< X-Plane says it, and its projection matrix, where that answers, agrees
 };
 
@@ -34,5 +35,10 @@ inline constexpr double kFrustumTolerance = 0.005;
 /// The frustum of a sample.
 /// @param assumed_deg horizontal field of view where X-Plane does not say it
 Frustum frustumOf(const FrustumSample& sample, double assumed_deg);
+
+/// Whether a picture of this size [px] can be of the whole window that a frustum is of; true where the window's size is
+/// not known.
+/// @param is_region of the screen: a part of a window may have its shape, so only the window's very size will do
+bool canShowWhole(const Frustum& frustum, int width, int height, bool is_region);
 
 }  // namespace xplane_bridge::core

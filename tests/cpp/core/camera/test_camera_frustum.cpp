@@ -37,8 +37,25 @@ TEST(Frustum, ProportionalHasSquarePixels) {
   EXPECT_TRUE(frustum.known);
   EXPECT_EQ(frustum.horizontal_deg, 90.0);
   EXPECT_EQ(frustum.vertical_deg, 0.0);
-  EXPECT_NEAR(frustum.aspect, 4.0 / 3.0, 1e-12);
-  EXPECT_EQ(core::frustumOf(core::FrustumSample(), 60.0).aspect, 0.0);
+  EXPECT_EQ(frustum.width, 640.0);
+  EXPECT_EQ(frustum.height, 480.0);
+  EXPECT_EQ(core::frustumOf(core::FrustumSample(), 60.0).width, 0.0);
+}
+
+TEST(Frustum, APictureOfTheWholeWindowHasItsShape) {
+  const core::Frustum frustum = core::frustumOf(proportional(), 60.0);
+  EXPECT_TRUE(core::canShowWhole(frustum, 640, 480, false));
+  EXPECT_TRUE(core::canShowWhole(frustum, 320, 241, false)) << "scaled by a sender";
+  EXPECT_FALSE(core::canShowWhole(frustum, 320, 400, false));
+  EXPECT_TRUE(core::canShowWhole({}, 320, 400, false)) << "of a window that is not known";
+}
+
+TEST(Frustum, ARegionOfTheScreenIsTheWholeWindowOnlyInItsVerySize) {
+  const core::Frustum frustum = core::frustumOf(proportional(), 60.0);
+  EXPECT_TRUE(core::canShowWhole(frustum, 640, 480, true));
+  EXPECT_FALSE(core::canShowWhole(frustum, 320, 240, true)) << "a part that has its shape";
+  EXPECT_FALSE(core::canShowWhole(frustum, 640, 479, true));
+  EXPECT_TRUE(core::canShowWhole({}, 320, 240, true)) << "of a window that is not known";
 }
 
 TEST(Frustum, AssumedWhereXPlaneDoesNotAnswer) {
