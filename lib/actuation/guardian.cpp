@@ -187,7 +187,9 @@ bool HangWatch::passed(double elapsed, double timeout) {
 }
 
 std::shared_ptr<core::Journal> guardedJournal(const std::string& path, std::int64_t parent) {
-  const auto runs = [parent](const core::JournalOwner& owner) { return owner.pid != parent && core::isAlive(owner); };
+  const auto runs = [parent, path](const core::JournalOwner& owner) {
+    return !core::isProcess(owner, parent) && core::isAlive(owner, path);
+  };
   return std::make_shared<core::Journal>(path, core::thisProcess("override_guardian"), runs, false);
 }
 

@@ -314,32 +314,6 @@ void write(const std::string& path, const std::vector<JournalEntry>& entries) {
   syncFolder(path);
 }
 
-std::string firstLine(const char* path) {
-  std::ifstream file(path);
-  std::string line;
-  std::getline(file, line);
-  return line;
-}
-
-/// Start time of a process in clock ticks since boot; 0 when there is no such process.
-std::int64_t startTicks(std::int64_t pid) {
-  const std::string stat = firstLine(("/proc/" + std::to_string(pid) + "/stat").c_str());
-  // The second field is the program's name in brackets and may hold anything; fields are counted from behind it.
-  const std::size_t bracket = stat.rfind(')');
-  if (bracket == std::string::npos) {
-    return 0;
-  }
-  constexpr int kFieldsBetween = 19;  // of field 22, counted from field 3
-  std::istringstream fields(stat.substr(bracket + 1));
-  std::string skipped;
-  for (int i = 0; i < kFieldsBetween; ++i) {
-    fields >> skipped;
-  }
-  std::int64_t ticks = 0;
-  fields >> ticks;
-  return ticks;
-}
-
 }  // namespace
 
 std::string whyNotChanged(const JournalError& error) {
@@ -363,24 +337,12 @@ EncodeResult encodeUndo(ByteSpan out, const UndoOperation& operation) {
   return std::visit(Encoder{out}, operation);
 }
 
-JournalOwner thisProcess(const std::string& node) {
-  std::array<char, 256> computer{};
-  if (gethostname(computer.data(), computer.size() - 1) != 0) {
-    computer[0] = '\0';
-  }
-  return {node, getpid(), startTicks(getpid()), firstLine("/proc/sys/kernel/random/boot_id"), computer.data()};
-}
-
-bool isAlive(const JournalOwner& owner) {
-  const JournalOwner here = thisProcess("");
-  if (owner.boot_id != here.boot_id) {
-    return owner.computer != here.computer;
-  }
-  return owner.start_ticks != 0 && startTicks(owner.pid) == owner.start_ticks;
-}
-
 Journal::Journal(std::string path, JournalOwner self, AliveFunction alive, bool waits)
-    : path_(std::move(path)), self_(std::move(self)), alive_(std::move(alive)), waits_(waits) {}
+    : path_(std::move(path)), self_(std::move(self)), alive_(std::move(alive)), waits_(waits) {
+  if (!alive_) {
+    alive_ = [file = path_](const JournalOwner& owner) { return isAlive(owner, file); };
+  }
+}
 
 std::shared_ptr<Journal> Journal::ofSubscriptions() const {
   const fs::path path(path_);
@@ -407,6 +369,44 @@ std::vector<JournalEntry> Journal::orphans(const std::string& purpose) const {
               found.end());
   return found;
 }
+
+std::vector<JournalEntry> Journal::own() const {
+  std::vector<JournalEntry> found = entries();
+  found.erase(
+      std::remove_if(found.begin(), found.end(), [&](const JournalEntry& entry) { return entry.owner != self_; }),
+      found.end());
+  return found;
+}
+
+void Journal::record(const std::string& id, const std::string& purpose, std::vector<UndoOperation> undo,
+                     std::vector<JournalSubscription> subscriptions) {
+  record({JournalRecord{id, purpose, std::move(undo), std::move(subscriptions)}});
+}
+
+void Journal::record(std::vector<JournalRecord> records) {
+  if (records.empty()) {
+    return;
+  }
+  const Lock lock(path_, waits_);
+  showAlive(self_, path_);
+  std::vector<JournalEntry> entries = read(path_);
+  for (JournalRecord& record : records) {
+    JournalEntry entry{record.id, record.purpose, self_, std::move(record.undo), "", std::move(record.subscriptions)};
+    const auto same =
+        std::find_if(entries.begin(), entries.end(), [&](const JournalEntry& each) { return each.id == record.id; });
+    if (same == entries.end()) {
+      entries.push_back(std::move(entry));
+    } else if (same->owner != self_ && alive_(same->owner)) {
+      throw JournalTakenError("'" + record.id + "' belongs to " + same->owner.node + " (process " +
+                              std::to_string(same->owner.pid) + " on " + same->owner.computer +
+                              "), which still runs: end it first");
+    } else {
+      *same = std::move(entry);
+    }
+  }
+  write(path_, entries);
+}
+
 std::vector<UndoOperation> Journal::handOver(const std::string& id) {
   const auto is_own = [&](const JournalEntry& each) { return each.id == id && each.owner == self_; };
   std::vector<JournalEntry> entries = this->entries();
@@ -434,43 +434,6 @@ std::vector<UndoOperation> Journal::handOver(const std::string& id) {
   }
   write(path_, entries);
   return left;
-}
-
-
-std::vector<JournalEntry> Journal::own() const {
-  std::vector<JournalEntry> found = entries();
-  found.erase(
-      std::remove_if(found.begin(), found.end(), [&](const JournalEntry& entry) { return entry.owner != self_; }),
-      found.end());
-  return found;
-}
-
-void Journal::record(const std::string& id, const std::string& purpose, std::vector<UndoOperation> undo,
-                     std::vector<JournalSubscription> subscriptions) {
-  record({JournalRecord{id, purpose, std::move(undo), std::move(subscriptions)}});
-}
-
-void Journal::record(std::vector<JournalRecord> records) {
-  if (records.empty()) {
-    return;
-  }
-  const Lock lock(path_, waits_);
-  std::vector<JournalEntry> entries = read(path_);
-  for (JournalRecord& record : records) {
-    JournalEntry entry{record.id, record.purpose, self_, std::move(record.undo), "", std::move(record.subscriptions)};
-    const auto same =
-        std::find_if(entries.begin(), entries.end(), [&](const JournalEntry& each) { return each.id == record.id; });
-    if (same == entries.end()) {
-      entries.push_back(std::move(entry));
-    } else if (same->owner != self_ && alive_(same->owner)) {
-      throw JournalTakenError("'" + record.id + "' belongs to " + same->owner.node + " (process " +
-                              std::to_string(same->owner.pid) + " on " + same->owner.computer +
-                              "), which still runs: end it first");
-    } else {
-      *same = std::move(entry);
-    }
-  }
-  write(path_, entries);
 }
 
 void Journal::leave(const std::vector<std::string>& ids, const std::string& why) {

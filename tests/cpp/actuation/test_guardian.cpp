@@ -138,8 +138,19 @@ TEST_F(GuardedProcess, ParentThatHasNotBeenWaitedForCountsAsGone) {
   kill(child_, SIGKILL);
   siginfo_t ended{};
   ASSERT_EQ(waitid(P_PID, static_cast<id_t>(child_), &ended, WEXITED | WNOWAIT), 0);  // and stays as a zombie
-  EXPECT_TRUE(guardedJournal(path_, child_ + 1)->orphans(kOverridePurpose).empty()) << "a zombie is still a process";
+  EXPECT_EQ(guardedJournal(path_, child_ + 1)->orphans(kOverridePurpose).size(), 1U) << "for the guardian of another process";
   EXPECT_EQ(guardedJournal(path_, child_)->orphans(kOverridePurpose).size(), 1U);
+}
+
+TEST_F(GuardedProcess, ProcessOfAnotherContainerWithTheParentsNumberIsLeftAlone) {
+  const core::JournalEntry before = core::Journal(path_, core::thisProcess("/test")).entries().at(0);
+  core::JournalOwner other = before.owner;
+  other.start_ticks += 1;
+  const std::string path = sim_.folder() + "/other.json";
+  core::Journal(path, other).record("two", kOverridePurpose, {core::UndoDref{kJoystick, 0.0F}});
+  const OwnerByte byte(path, other);
+  byte.lock();
+  EXPECT_TRUE(guardedJournal(path, child_)->orphans(kOverridePurpose).empty());
 }
 
 class ReleaseLeftBehind : public testing::Test {

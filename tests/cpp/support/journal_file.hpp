@@ -11,9 +11,12 @@
 #include <chrono>
 #include <cstddef>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <thread>
+
+#include "xplane_bridge/core/link/journal_owner.hpp"
 
 namespace xplane_bridge {
 
@@ -45,6 +48,45 @@ class HeldLock {
 
  private:
   int fd_;
+};
+
+/// The byte of an owner in the file beside the journal, as docs/nodes/journal.md has it: locked while the owner runs.
+class OwnerByte {
+ public:
+  OwnerByte(const std::string& journal, const core::JournalOwner& owner)
+      : fd_(open((std::filesystem::path(journal).parent_path() / "owners.lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC,
+                 0644)),
+        start_(owner.start_ticks * 4194304 + owner.pid) {}
+  ~OwnerByte() { close(fd_); }
+  OwnerByte(const OwnerByte&) = delete;
+  OwnerByte& operator=(const OwnerByte&) = delete;
+
+  void lock() const {
+    struct flock byte = of(F_RDLCK);
+    EXPECT_EQ(fcntl(fd_, F_OFD_SETLK, &byte), 0);
+  }
+  void unlock() const {
+    struct flock byte = of(F_UNLCK);
+    EXPECT_EQ(fcntl(fd_, F_OFD_SETLK, &byte), 0);
+  }
+  bool isLockedByAnother() const {
+    struct flock byte = of(F_WRLCK);
+    EXPECT_EQ(fcntl(fd_, F_OFD_GETLK, &byte), 0);
+    return byte.l_type != F_UNLCK;
+  }
+
+ private:
+  struct flock of(int type) const {
+    struct flock byte {};
+    byte.l_type = static_cast<decltype(byte.l_type)>(type);
+    byte.l_whence = SEEK_SET;
+    byte.l_start = start_;
+    byte.l_len = 1;
+    return byte;
+  }
+
+  int fd_;
+  off_t start_;
 };
 
 /// How often a file of a folder has been replaced by another one since.

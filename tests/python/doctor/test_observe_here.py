@@ -1,10 +1,12 @@
 """What the doctor observes on this computer: journals, ROS, windows, joysticks, clock."""
 
+import fcntl
 import json
 import os
 import shutil
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -19,6 +21,9 @@ from xplane_bridge.doctor.observe.journals import Owner
 from xplane_bridge.doctor.settings import Settings
 from xplane_bridge.harness import wait_until
 from xplane_bridge.harness.display import VirtualDisplay
+
+#: Python names it from 3.9 on.
+F_OFD_SETLK = 37
 
 # --------------------------------------------------------------------------------------------------------- journals
 
@@ -88,6 +93,21 @@ def test_owners_before_a_reboot_and_on_other_computers(tmp_path):
     assert owner_in(tmp_path) is Owner.GONE
     write_journal(tmp_path, owner_of(1, 1, boot_id="theirs", computer="another"))
     assert owner_in(tmp_path) is Owner.ELSEWHERE
+
+
+def test_an_owner_in_another_container_runs_while_it_has_its_byte_locked(tmp_path, sleeper):
+    owner = owner_of(sleeper.pid, start_ticks(sleeper.pid) + 1)  # that number is another process's here
+    write_journal(tmp_path, owner)
+    with open(tmp_path / "owners.lock", "a+b") as locked:
+        start = owner["start_ticks"] * 4194304 + owner["pid"]
+        fcntl.fcntl(locked, F_OFD_SETLK, struct.pack("@hhqqi4x", fcntl.F_RDLCK, os.SEEK_SET, start, 1, 0))
+        assert owner_in(tmp_path) is Owner.RUNS
+        owner["pid"] += 1
+        write_journal(tmp_path, owner)
+        assert owner_in(tmp_path) is Owner.GONE
+        owner["pid"] -= 1
+        write_journal(tmp_path, owner)
+    assert owner_in(tmp_path) is Owner.GONE
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"format": "xplane_bridge journal", "version": 2, "entries": []}', "{}"])

@@ -12,6 +12,7 @@
 #include <variant>
 #include <vector>
 
+#include "xplane_bridge/core/link/journal_owner.hpp"
 #include "xplane_bridge/core/wire/packets.hpp"
 #include "xplane_bridge/core/wire/udp_socket.hpp"
 
@@ -62,26 +63,6 @@ EncodeResult encodeUndo(ByteSpan out, const UndoOperation& operation);
 /// Room for any operation's datagram.
 constexpr std::size_t kMaxUndoSize = kMaxDselSize;
 
-/// The process that made a change. A process id alone may have been given to another process since.
-struct JournalOwner {
-  std::string node;  ///< for people: "/xplane/tx_node"
-  std::int64_t pid = 0;
-  std::int64_t start_ticks = 0;  ///< start time of the process, /proc/<pid>/stat field 22
-  std::string boot_id;           ///< /proc/sys/kernel/random/boot_id
-  std::string computer;          ///< host name
-
-  friend bool operator==(const JournalOwner& a, const JournalOwner& b) {
-    return a.pid == b.pid && a.start_ticks == b.start_ticks && a.boot_id == b.boot_id;
-  }
-  friend bool operator!=(const JournalOwner& a, const JournalOwner& b) { return !(a == b); }
-};
-
-/// This process, under the name `node`.
-JournalOwner thisProcess(const std::string& node);
-/// Whether the process that wrote the entry still runs. A process of another computer (other host name and boot id; the
-/// file may lie on a shared disk) is taken to run: its changes are not ours to undo.
-bool isAlive(const JournalOwner& owner);
-
 /// What X-Plane sends to one UDP port of ours until we ask it to stop: by datagrams from that port.
 struct JournalSubscription {
   std::uint16_t port = 0;
@@ -119,16 +100,13 @@ class Journal {
   using AliveFunction = std::function<bool(const JournalOwner&)>;
 
   /// `path`: see journalPath(). The folder is made when first needed. `self` owns what record() writes. `waits`: for
-  /// the lock; otherwise calls that write throw JournalError while another process has it.
-  Journal(std::string path, JournalOwner self, AliveFunction alive = isAlive, bool waits = true);
+  /// the lock; otherwise calls that write throw JournalError while another process has it. `alive`: whether an owner
+  /// runs; empty: isAlive().
+  Journal(std::string path, JournalOwner self, AliveFunction alive = {}, bool waits = true);
 
   const std::string& path() const { return path_; }
   const JournalOwner& self() const { return self_; }
 
-  /// Takes out of this process's entry of that id the datarefs that entries of other processes hold which run: the last
-  /// of them gives them back. Under the lock, so that of two that end at once one does; without it where nothing is
-  /// shared. Returns what is left to be undone; empty: the entry is gone.
-  std::vector<UndoOperation> handOver(const std::string& id);
   /// The journal of subscriptions beside this one, "<file>_subscriptions.json": a process that gives overrides back
   /// never has to wait for a node that is writing down hundreds of datarefs, or was stopped in the middle of that.
   std::shared_ptr<Journal> ofSubscriptions() const;
@@ -147,6 +125,10 @@ class Journal {
               std::vector<JournalSubscription> subscriptions = {});
   /// The same of several at the price of one, the file being replaced once: all of them or, when it throws, none.
   void record(std::vector<JournalRecord> records);
+  /// Takes out of this process's entry of that id the datarefs that entries of other processes hold which run: the last
+  /// of them gives them back. Under the lock, so that of two that end at once one does; without it where nothing is
+  /// shared. Returns what is left to be undone; empty: the entry is gone.
+  std::vector<UndoOperation> handOver(const std::string& id);
   /// Writes into this process's entries of these ids why they are left behind.
   void leave(const std::vector<std::string>& ids, const std::string& why);
   /// Removes entries by id; unknown ids are no error. The file goes with its last entry.
@@ -162,20 +144,6 @@ class Journal {
   AliveFunction alive_;
   bool waits_;
 };
-
-/// What X-Plane had in a dataref before the first change of those that entries undo: the user's own value, which
-/// X-Plane does not show meanwhile. nullopt: none of them has changed it. Look at entries read after the dataref was.
-inline std::optional<float> valueBefore(const std::vector<JournalEntry>& entries, const std::string& dataref) {
-  for (const JournalEntry& entry : entries) {
-    for (const UndoOperation& operation : entry.undo) {
-      const auto* dref = std::get_if<UndoDref>(&operation);
-      if (dref != nullptr && dref->path == dataref) {
-        return dref->value;
-      }
-    }
-  }
-  return std::nullopt;
-}
 
 /// "<folder>/<host>_<port>.json" with characters that do not belong in a file name replaced by '-'.
 /// By convention the folder is ~/.ros/xplane_bridge.
@@ -193,6 +161,20 @@ inline std::optional<JournalEntry> ownEntry(const Journal& journal, const std::s
   const auto found = std::find_if(own.begin(), own.end(), [&id](const JournalEntry& entry) { return entry.id == id; });
   if (found == own.end()) return std::nullopt;
   return std::move(*found);
+}
+
+/// What X-Plane had in a dataref before the first change of those that entries undo: the user's own value, which
+/// X-Plane does not show meanwhile. nullopt: none of them has changed it. Look at entries read after the dataref was.
+inline std::optional<float> valueBefore(const std::vector<JournalEntry>& entries, const std::string& dataref) {
+  for (const JournalEntry& entry : entries) {
+    for (const UndoOperation& operation : entry.undo) {
+      const auto* dref = std::get_if<UndoDref>(&operation);
+      if (dref != nullptr && dref->path == dataref) {
+        return dref->value;
+      }
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace xplane_bridge::core

@@ -13,7 +13,16 @@ from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence
 
 from xplane_bridge import protocol
 from xplane_bridge.doctor.observe.computer import is_same_computer
-from xplane_bridge.doctor.observe.journals import HEAD, Owner, boot_id, files, judge_owner, load, process_status
+from xplane_bridge.doctor.observe.journals import (
+    HEAD,
+    Owner,
+    boot_id,
+    files,
+    judge_owner,
+    load,
+    process_status,
+    show_alive,
+)
 
 NODE = "xplane_doctor"
 #: Purposes as the nodes have them: tx_node and rx_node undo what a doctor left that was killed.
@@ -119,6 +128,7 @@ class Journal:
         """Notes how to undo a change; only when this returns may it be made. The first note of an id counts."""
 
         def add(entries: List[Entry]) -> List[Entry]:
+            show_alive(self._self, self.file.parent)
             same = [entry for entry in entries if entry["id"] == id_]
             if any(self._is_own(entry) for entry in same):
                 return entries
@@ -148,7 +158,7 @@ class Journal:
         return all(entry["owner"].get(key) == self._self[key] for key in ("pid", "start_ticks", "boot_id"))
 
     def _is_gone(self, entry: Entry) -> bool:
-        return judge_owner(entry["owner"], self._proc) is Owner.GONE
+        return judge_owner(entry["owner"], self.file.parent, self._proc) is Owner.GONE
 
     def _change(self, how: Callable[[List[Entry]], List[Entry]]) -> None:
         with self._locked():

@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+import contextlib
 import enum
+import importlib
 import json
+import os
 import re
 import socket
+import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, Tuple
 
 #: What a file says of itself.
 HEAD = {"format": "xplane_bridge journal", "version": 1}
+#: Beside the journals: each owner has a byte of it locked while it runs, which is seen from other containers as well.
+_OWNERS = "owners.lock"
+#: The system's F_OFD_GETLK and F_OFD_SETLK, which Python names from 3.9 on: locks of the open file. Those of F_SETLK,
+#: which are the process's, would go with any closing of the file.
+_GET_LOCK, _SET_LOCK = 36, 37
+#: The system's struct flock: type, whence, start, length, process.
+_LOCK = struct.Struct("@hhqqi4x")
+_PID_BITS = 22
 
 
 class Owner(enum.Enum):
@@ -70,7 +82,7 @@ def read(folder: Path, proc: Path = Path("/proc")) -> Tuple[Journal, ...]:
     found = []
     for file, host, port in files(folder):
         try:
-            entries = tuple(_entry(entry, proc) for entry in load(file))
+            entries = tuple(_entry(entry, folder, proc) for entry in load(file))
             found.append(Journal(file, host, port, entries))
         except FileNotFoundError:  # everything was undone just now
             continue
@@ -101,7 +113,7 @@ def load(file: Path) -> List[Dict[str, Any]]:
     return list(content["entries"])
 
 
-def _entry(entry: Any, proc: Path) -> Entry:
+def _entry(entry: Any, folder: Path, proc: Path) -> Entry:
     owner = entry["owner"]
     return Entry(
         id=str(entry["id"]),
@@ -109,21 +121,53 @@ def _entry(entry: Any, proc: Path) -> Entry:
         node=str(owner["node"]),
         pid=int(owner["pid"]),
         computer=str(owner["computer"]),
-        owner=judge_owner(owner, proc),
+        owner=judge_owner(owner, folder, proc),
     )
 
 
-def judge_owner(owner: Any, proc: Path) -> Owner:
-    """How the owner's process is, as the bridge itself judges it: by boot, process number and start time."""
+def judge_owner(owner: Any, folder: Path, proc: Path) -> Owner:
+    """How the owner's process is, as the bridge itself judges it: by boot, process number and start time, and lock.
+
+    Args:
+        owner: As in a journal of the folder.
+        folder: Of the journals.
+        proc: Folder of Linux's process file system.
+    """
     if owner["boot_id"] != boot_id(proc):
         return Owner.GONE if owner["computer"] == socket.gethostname() else Owner.ELSEWHERE
     try:
         state, start_ticks = process_status(proc, str(owner["pid"]))
     except OSError:
-        return Owner.GONE
-    if start_ticks != int(owner["start_ticks"]) or state == "Z":
-        return Owner.GONE
-    return Owner.STOPPED if state in "Tt" else Owner.RUNS
+        state, start_ticks = "X", 0
+    if start_ticks == int(owner["start_ticks"]) and state not in "ZX":
+        return Owner.STOPPED if state in "Tt" else Owner.RUNS
+    return Owner.RUNS if _is_shown_alive(owner, folder) else Owner.GONE  # RUNS: in another container
+
+
+def show_alive(owner: Any, folder: Path) -> None:
+    """Lets judge_owner() of other containers see this process, which is the owner, until it ends, however it ends."""
+    if _is_shown_alive(owner, folder):
+        return
+    fcntl = importlib.import_module("fcntl")
+    with contextlib.suppress(OSError):  # no container but this one's sees it then
+        file = os.open(folder / _OWNERS, os.O_RDONLY | os.O_CREAT, 0o644)
+        fcntl.fcntl(file, _SET_LOCK, _byte_of(owner, fcntl.F_RDLCK))  # which stays open: its lock is the file's
+
+
+def _is_shown_alive(owner: Any, folder: Path) -> bool:
+    fcntl = importlib.import_module("fcntl")  # the doctor starts without it, as on Windows
+    try:
+        with open(folder / _OWNERS, "rb") as file:
+            found = fcntl.fcntl(file, _GET_LOCK, _byte_of(owner, fcntl.F_WRLCK))  # which every other lock refuses
+    except OSError:
+        return False
+    return bool(_LOCK.unpack(found)[0] != fcntl.F_UNLCK)
+
+
+def _byte_of(owner: Any, kind: int) -> bytes:
+    """The lock of the owner's byte in the file of owners."""
+    start = (int(owner["start_ticks"]) << _PID_BITS | int(owner["pid"])) & (2**63 - 1)
+    return _LOCK.pack(kind, os.SEEK_SET, start, 1, 0)
 
 
 def process_status(proc: Path, pid: str) -> Tuple[str, int]:

@@ -258,7 +258,7 @@ TEST_F(JournalTest, DamagedFileIsNotMovedWhileAnotherProcessHasTheLock) {
 
 TEST_F(JournalTest, ThatDoesNotWaitRefusesToWriteWhileItIsLocked) {
   journal().record("a", "override", kReleaseJoystick);
-  Journal hasty(path_, thisProcess("/hasty"), isAlive, false);
+  Journal hasty(path_, thisProcess("/hasty"), {}, false);
   {
     const HeldLock held(path_);
     EXPECT_THROW(hasty.record("b", "override", kReleaseJoystick), JournalError);
@@ -356,25 +356,6 @@ TEST_F(JournalTest, ProcessesDoNotLoseEachOthersEntries) {
   }
   EXPECT_EQ(ids.size(), static_cast<std::size_t>(kProcesses * kEach));
   EXPECT_EQ(journal().orphans("override").size(), ids.size()) << "their processes have ended";
-}
-
-TEST(JournalOwner, AliveMeansTheSameProcess) {
-  const JournalOwner self = thisProcess("/me");
-  EXPECT_TRUE(isAlive(self));
-  JournalOwner reused = self;
-  reused.start_ticks += 5;
-  EXPECT_FALSE(isAlive(reused));
-  JournalOwner unknown = self;
-  unknown.pid = 0x7FFFFFF0;
-  EXPECT_FALSE(isAlive(unknown));
-  unknown.start_ticks = 0;
-  EXPECT_FALSE(isAlive(unknown));
-  JournalOwner before_reboot = self;
-  before_reboot.boot_id = "another";
-  EXPECT_FALSE(isAlive(before_reboot));
-  JournalOwner elsewhere = before_reboot;
-  elsewhere.computer = "another-computer";
-  EXPECT_TRUE(isAlive(elsewhere));
 }
 
 TEST(JournalPath, HoldsOnlyFileCharacters) {
