@@ -7,6 +7,9 @@ import json
 import math
 import os
 import socket
+import struct
+import subprocess
+import sys
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -27,6 +30,7 @@ STICK, WIND, GUST = (
     "sim/weather/wind_speed_kt[0]",
     "sim/weather/shear_speed_kt[0]",
 )
+THROTTLES, LEVER = "sim/operation/override/override_throttles", "sim/cockpit2/engine/actuators/throttle_ratio[0]"
 PROC = Path("/proc")
 
 
@@ -52,6 +56,31 @@ def test_a_value_that_is_no_number_is_refused_and_the_rest_stays_readable(notes)
     with pytest.raises(JournalError, match="no number cannot be noted"):
         notes.record("b", journal.OVERRIDE, [write_dataref("sim/a", math.nan)])
     assert [entry["id"] for entry in notes.own()] == ["a"]
+
+
+def test_its_owner_is_seen_from_other_containers_until_it_ends(notes):
+    show = (
+        "import os, sys; from pathlib import Path; from xplane_bridge.doctor.conformance import journal;"
+        "journal.Journal(Path(sys.argv[1]), '127.0.0.1', 49000).record('a', 'override', []); print(flush=True); input()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", show, str(notes.file.parent)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as owner:
+        owner.stdout.readline()
+        (left,) = journal.load(notes.file)
+        assert is_byte_locked(notes.file.parent, left["owner"])
+        owner.kill()
+    assert not is_byte_locked(notes.file.parent, left["owner"])
+    assert [entry["id"] for entry in notes.orphans()] == ["a"]
+
+
+def is_byte_locked(folder, owner):
+    """Whether an owner has its byte locked, as docs/nodes/journal.md has it."""
+    start = owner["start_ticks"] * 4194304 + owner["pid"]
+    byte = struct.pack("@hhqqi4x", fcntl.F_WRLCK, os.SEEK_SET, start, 1, 0)
+    with open(folder / "owners.lock", "rb") as file:
+        found = fcntl.fcntl(file, 36, byte)  # F_OFD_GETLK, which Python names from 3.9 on
+    return struct.unpack("@hhqqi4x", found)[0] != fcntl.F_UNLCK
 
 
 def entry(id_, pid, *undo, purpose="override"):
@@ -95,10 +124,37 @@ def test_a_journal_of_another_address_that_cannot_be_understood_is_said(notes):
         notes.holders()
 
 
-def test_what_x_plane_does_not_confirm_is_written_twice_and_taken_out(tmp_path, monkeypatch):
-    def unconfirmed(path, value):
-        return {**write_dataref(path, value), "confirm": False}
+def unconfirmed(path, value):
+    return {**write_dataref(path, value), "confirm": False}
 
+
+def written(xplane):
+    requests = [protocol.decode_request(datagram) for datagram in xplane.others]
+    return [(request.path, request.value) for request in requests]
+
+
+@pytest.mark.parametrize(
+    ("shown", "sent"),
+    [
+        ({THROTTLES: 1.0}, [(LEVER, 0.5), (THROTTLES, 0.0)]),
+        ({THROTTLES: 0.0}, [(THROTTLES, 0.0)]),  # a restarted X-Plane, whose engines are off
+    ],
+)
+def test_levers_are_given_back_once_and_not_to_a_flight_that_has_its_own(tmp_path, monkeypatch, shown, sent):
+    monkeypatch.setattr(link, "_UNCONFIRMED_AGAIN_S", 0.0)
+    with FakeXPlane(shown) as xplane:
+        notes = Journal(tmp_path, "127.0.0.1", xplane.port)
+        write(notes.file, entry(f"override:{THROTTLES}", 0, unconfirmed(LEVER, 0.5), write_dataref(THROTTLES, 0.0)))
+        to = link.XPlane("127.0.0.1", xplane.port, notes)
+        assert to.undo(notes.orphans()) == []
+        to.write(STICK, 0.0)  # behind it nothing is under way
+        to.close()
+        wait_until(lambda: (STICK, 0.0) in written(xplane), WAIT_S, "the last write")
+        assert written(xplane) == [*sent, (STICK, 0.0)]
+    assert not notes.file.exists()
+
+
+def test_entries_of_which_x_plane_confirms_nothing_are_written_twice_and_taken_out(tmp_path, monkeypatch):
     first = [(STICK, 0.0), (WIND, 4.0), (GUST, 1.0), (WIND, 3.0)]
     waits, looked_at = [], []
     with FakeXPlane({}) as xplane:
@@ -109,12 +165,8 @@ def test_what_x_plane_does_not_confirm_is_written_twice_and_taken_out(tmp_path, 
             entry(f"override:{STICK}", 0, write_dataref(STICK, 0.0), unconfirmed(WIND, 4.0)),
         )
 
-        def written():
-            requests = [protocol.decode_request(datagram) for datagram in xplane.others]
-            return [(request.path, request.value) for request in requests]
-
         def sleep(seconds):
-            wait_until(lambda: written() == first, WAIT_S, "the first writes")
+            wait_until(lambda: written(xplane) == first, WAIT_S, "the first writes")
             waits.append((seconds, notes.file.exists()))
 
         def shows(_, wanted):  # the stick alone: the wind is another by then
@@ -126,8 +178,8 @@ def test_what_x_plane_does_not_confirm_is_written_twice_and_taken_out(tmp_path, 
         to = link.XPlane("127.0.0.1", xplane.port, notes)
         assert to.undo(notes.orphans()) == []
         to.close()
-        again = [(WIND, 4.0), (GUST, 1.0), (WIND, 3.0)]
-        wait_until(lambda: written() == first + again, WAIT_S, "the second writes")
+        again = [(GUST, 1.0), (WIND, 3.0)]
+        wait_until(lambda: written(xplane) == first + again, WAIT_S, "the second writes")
     assert waits == [(1.0, True)]
     assert looked_at == [{STICK: 0.0}]
     assert not notes.file.exists()

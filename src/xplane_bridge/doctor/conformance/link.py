@@ -30,7 +30,7 @@ _ANSWER_S = 1.5
 _REPEAT_S = 0.5
 _ATTEMPTS = 5
 _SHOWN = 1e-3
-#: What X-Plane does not confirm is written twice, so long apart [s].
+#: Entries of which X-Plane confirms nothing are written twice, so long apart [s].
 _UNCONFIRMED_AGAIN_S = 1.0
 _NETWORK_RATE = "sim/network/dataout/network_data_rate"
 
@@ -259,10 +259,14 @@ class XPlane:
         left = []
         again: Dict[str, List[Operation]] = {}
         for entry in reversed(entries):
-            unconfirmed = [each for each in entry["undo"] if each["op"] == "dref" and not _is_confirmed(each)]
-            if not self._carry_out(entry["undo"]):
+            operations, wanted = entry["undo"], _confirmed(entry["undo"])
+            unconfirmed = [each for each in operations if each["op"] == "dref" and not _is_confirmed(each)]
+            # Where X-Plane has its override back already, levers are those of another flight: they stay.
+            if wanted and unconfirmed and _has(self.try_read(list(wanted)), wanted):
+                operations = [each for each in operations if each not in unconfirmed]
+            if not self._carry_out(operations):
                 left.append(entry["id"])
-            elif unconfirmed:
+            elif unconfirmed and not wanted:  # levers are not sent again: they are the pilot's after the release
                 again[entry["id"]] = unconfirmed
             else:
                 self.journal.remove([entry["id"]])
@@ -274,7 +278,7 @@ class XPlane:
         return left
 
     def _carry_out(self, operations: Sequence[Operation]) -> bool:
-        wanted = {each["path"]: each["value"] for each in operations if each["op"] == "dref" and _is_confirmed(each)}
+        wanted = _confirmed(operations)
         for _ in range(_ATTEMPTS):
             self._send_all(operations)
             if not wanted or self._shows(wanted):
@@ -287,10 +291,7 @@ class XPlane:
                 self._out.socket.sendto(datagram(operation), (self.address, self.port))
 
     def _shows(self, wanted: Values) -> bool:
-        def fits(sample: Sample) -> bool:
-            return all(abs(sample[path] - value) <= _SHOWN * max(1.0, abs(value)) for path, value in wanted.items())
-
-        return self.wait_for(list(wanted), fits, 0.5) is not None
+        return self.wait_for(list(wanted), lambda sample: _has(sample.values, wanted), 0.5) is not None
 
     # --- Data Output ----------------------------------------------------------------------------------------------
 
@@ -347,3 +348,14 @@ class XPlane:
 def _is_confirmed(operation: Operation) -> bool:
     """Whether a write is undone only once X-Plane shows the value."""
     return bool(operation.get("confirm", True))
+
+
+def _confirmed(operations: Sequence[Operation]) -> Values:
+    """What X-Plane is to show once these are carried out."""
+    return {each["path"]: each["value"] for each in operations if each["op"] == "dref" and _is_confirmed(each)}
+
+
+def _has(shown: Values, wanted: Values) -> bool:
+    return all(
+        path in shown and abs(shown[path] - value) <= _SHOWN * max(1.0, abs(value)) for path, value in wanted.items()
+    )
