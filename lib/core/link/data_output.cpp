@@ -18,6 +18,8 @@ constexpr const char* kPurpose = "data_output";
 constexpr double kQuiet = 1.0;
 constexpr double kQuietPeriods = 3.0;
 constexpr int kMaxTries = 3;
+/// Between two times that X-Plane is asked what its Data Output was.
+constexpr std::int64_t kAskAgainNs = 5 * kNanosecondsPerSecond;
 constexpr float kRateTolerance = 0.5F;  // the dataref is an int
 
 std::string listOf(const std::vector<std::int32_t>& rows) {
@@ -53,8 +55,8 @@ void DataOutput::linkUp(std::shared_ptr<Journal> journal, const Endpoint& target
   ever_heard_ = false;
   taken_back_ = false;
   tries_ = 0;
-  quiet_since_ns_ = now_ns;
-  row_heard_ns_.fill(now_ns);
+  startWaiting(now_ns);
+  ask_again_ns_ = now_ns;
   row_repairs_ = 0;
   row_problem_ = false;
   quiet_problem_ = false;
@@ -67,6 +69,11 @@ void DataOutput::linkUp(std::shared_ptr<Journal> journal, const Endpoint& target
   if (options_.restore_leftovers && journal_ != nullptr) {
     restoreLeftovers();
   }
+}
+
+void DataOutput::startWaiting(std::int64_t now_ns) {
+  quiet_since_ns_ = now_ns;
+  row_heard_ns_.fill(now_ns);
 }
 
 void DataOutput::fail(const std::string& problem) {
@@ -88,6 +95,7 @@ std::optional<JournalEntry> DataOutput::previousEntry() const {
 
 void DataOutput::readPrevious() {
   phase_ = Phase::kReading;
+  interrupted_ = false;
   asked_rows_ = options_.rows;
   std::vector<std::string> paths = {kDataRateDataref};
   for (const std::int32_t row : asked_rows_) {
@@ -102,11 +110,18 @@ void DataOutput::readPrevious() {
 }
 
 void DataOutput::configure(const std::vector<DatarefValue>& values) {
-  if (!values[0].has_value()) {
+  const bool complete =
+      std::all_of(values.begin(), values.end(), [](const DatarefValue& value) { return value.has_value(); });
+  if (!values[0].has_value() || (interrupted_ && !complete)) {
     // Nothing is changed that could not be put back.
-    fail(std::string("Data Output is not configured: X-Plane does not answer ") + kDataRateDataref +
-         ", so the rate could not be restored; set Data Output in X-Plane by hand and configure_xplane: false, or use "
-         "transport: rref");
+    phase_ = Phase::kUnanswered;
+    const std::string problem =
+        std::string("Data Output is not configured: X-Plane does not answer ") + kDataRateDataref +
+        ", so the rate could not be restored; set Data Output in X-Plane by hand and configure_xplane: false, or use "
+        "transport: rref";
+    if (!interrupted_ && std::exchange(problem_, problem) != problem) {
+      services_.log(LogLevel::kError, problem);
+    }
     return;
   }
   float rate_before = *values[0];
@@ -152,6 +167,8 @@ void DataOutput::configure(const std::vector<DatarefValue>& values) {
     return;
   }
   phase_ = Phase::kActive;
+  problem_.clear();
+  row_problem_ = false;
   tries_ = 1;
   services_.log(LogLevel::kInfo, "Data Output of X-Plane set to rows " + listOf(asked_rows_) + " at " +
                                      std::to_string(options_.rate_hz) + " Hz to " + target_.toString());
@@ -188,17 +205,21 @@ void DataOutput::heard(const DataView& data, std::int64_t now_ns) {
 }
 
 void DataOutput::update(bool flowing, std::int64_t now_ns) {
+  interrupted_ = interrupted_ || !flowing;
+  if (phase_ == Phase::kUnanswered && flowing && now_ns >= ask_again_ns_) {
+    ask_again_ns_ = now_ns + kAskAgainNs;
+    startWaiting(now_ns);
+    readPrevious();
+  }
   if (phase_ != Phase::kActive) {
     return;
   }
   if (!flowing) {
-    quiet_since_ns_ = now_ns;
-    row_heard_ns_.fill(now_ns);
+    startWaiting(now_ns);
     return;
   }
   if (now_ns - quiet_since_ns_ > quiet_ns_) {
-    quiet_since_ns_ = now_ns;
-    row_heard_ns_.fill(now_ns);
+    startWaiting(now_ns);
     handleQuiet();
   } else if (ever_heard_) {
     repairRows(now_ns);

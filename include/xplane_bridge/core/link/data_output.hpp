@@ -38,7 +38,7 @@ struct DataOutputOptions {
 /// X-Plane has one target for DATA and does not show which it is. So: rows, rate and target are set when the link comes
 /// up, written to the journal first; when DATA stays away while X-Plane answers and is not paused, the target is set
 /// once more, and if that does not last, another client owns Data Output and is left in peace,
-/// also by release().
+/// also by release(). Where X-Plane does not say what it had before, nothing is changed and it is asked again.
 class DataOutput {
  public:
   struct Services {
@@ -66,9 +66,10 @@ class DataOutput {
   const std::string& problem() const { return problem_; }
 
  private:
-  enum class Phase : std::uint8_t { kIdle, kReading, kActive, kForeign, kFailed, kReleasing };
+  enum class Phase : std::uint8_t { kIdle, kReading, kUnanswered, kActive, kForeign, kFailed, kReleasing };
 
   void readPrevious();
+  void startWaiting(std::int64_t now_ns);
   void configure(const std::vector<DatarefValue>& values);
   void sendSettings(const std::vector<std::int32_t>& rows);
   void handleQuiet();
@@ -87,7 +88,9 @@ class DataOutput {
   std::shared_ptr<Journal> journal_;
   Endpoint target_;
   Phase phase_ = Phase::kIdle;
-  std::uint32_t generation_ = 0;  // answers to reads of an earlier link are ignored
+  bool interrupted_ = false;       // nothing flowed for a while since it was asked
+  std::int64_t ask_again_ns_ = 0;  // in kUnanswered
+  std::uint32_t generation_ = 0;   // answers to reads of an earlier link are ignored
   std::vector<std::int32_t> asked_rows_;
   int tries_ = 0;
   bool taken_back_ = false;

@@ -95,6 +95,45 @@ TEST_F(DataOutputTest, NothingIsChangedThatCannotBeRestored) {
   EXPECT_TRUE(hasProblem(kRate));
 }
 
+TEST_F(DataOutputTest, WhatAStallLeftUnansweredIsAskedForAgain) {
+  FakeXPlane sim;
+  makeLink(withRows(sim, {17}));
+  ASSERT_GE(runUntilState(LinkState::kConnected, 1.0, {&sim}), 0.0);
+  const std::uint32_t epoch = link_->status().epoch;
+  run(3.0, {});  // longer than a request is waited for, shorter than what counts as lost
+  EXPECT_TRUE(link_->status().problems.empty()) << "X-Plane may only be loading";
+  EXPECT_TRUE(dataFlowsWithin(3.0, &sim));
+  EXPECT_EQ(link_->status().epoch, epoch);
+}
+
+TEST_F(DataOutputTest, RowsThatAStallLeftUnansweredGoBackToo) {
+  FakeXPlane sim;
+  sim.datarefs.erase(FakeXPlane::rowPath(17));
+  makeLink(withRows(sim, {17}));
+  ASSERT_GE(runUntilState(LinkState::kConnected, 1.0, {&sim}), 0.0);
+  run(0.2, {&sim});  // in which only the rate is answered
+  run(3.0, {});
+  sim.datarefs[FakeXPlane::rowPath(17)] = 0.0F;
+  ASSERT_TRUE(dataFlowsWithin(3.0, &sim));
+  const std::vector<JournalEntry> entries = Journal(journalFile(sim), thisProcess("")).entries();
+  ASSERT_EQ(entries.size(), 1U);
+  EXPECT_TRUE(std::holds_alternative<UndoUsel>(entries[0].undo.at(0)));
+}
+
+TEST_F(DataOutputTest, ALateAnswerEndsTheProblem) {
+  FakeXPlane sim;
+  sim.datarefs.erase(kRate);
+  makeLink(withRows(sim, {17}));
+  run(20.0, {&sim});
+  EXPECT_TRUE(hasProblem(kRate));
+  EXPECT_EQ(std::count_if(log_.begin(), log_.end(),
+                          [](const std::string& line) { return line.find(kRate) != std::string::npos; }),
+            1);
+  sim.datarefs[kRate] = 20.0F;
+  EXPECT_TRUE(dataFlowsWithin(8.0, &sim));
+  EXPECT_TRUE(link_->status().problems.empty());
+}
+
 TEST_F(DataOutputTest, RowsOfUnknownStateAreNotTakenAway) {
   FakeXPlane sim;
   sim.datarefs.erase(FakeXPlane::rowPath(17));
