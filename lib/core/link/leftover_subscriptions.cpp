@@ -10,6 +10,8 @@ namespace {
 /// What X-Plane sent before it read the requests has arrived by then, and the slowest groups come once a second.
 constexpr std::int64_t kQuietNs = 1500 * kNanosecondsPerMillisecond;
 constexpr int kMaxAttempts = 3;  // a request may be lost
+/// For an index of which the name is not known. X-Plane goes by the index, whatever the name [? same-index].
+constexpr const char* kAnyDataref = "sim/time/paused";
 
 }  // namespace
 
@@ -36,7 +38,8 @@ void LeftoverSubscriptions::linkUp(std::shared_ptr<Journal> journal, std::int64_
     for (const JournalSubscription& subscription : entry.subscriptions) {
       try {
         sources_.push_back(open_(subscription.port));
-        ports_.push_back({subscription, 0, 1, false});
+        ports_.emplace_back().subscription = subscription;
+        ask(ports_.size() - 1);
       } catch (const SocketError& error) {
         // The process that has the port now gets what X-Plane still sends there.
         log_(LogLevel::kWarn,
@@ -55,28 +58,46 @@ void LeftoverSubscriptions::linkUp(std::shared_ptr<Journal> journal, std::int64_
   }
 }
 
-std::size_t LeftoverSubscriptions::requestsOf(const Port& port) const {
-  return port.subscription.datarefs.size() + (port.subscription.rpos ? 1U : 0U);
+void LeftoverSubscriptions::ask(std::size_t position) {
+  Port& port = ports_[position];
+  const std::vector<std::string>& datarefs = port.subscription.datarefs;
+  for (std::size_t i = 0; i < datarefs.size(); ++i) {
+    port.requests.push_back({sources_[position], datarefs[i], static_cast<std::int32_t>(i)});
+  }
+  for (const std::int32_t index : port.unnamed) {
+    port.requests.push_back({sources_[position], kAnyDataref, index});
+  }
+  if (port.subscription.rpos) {
+    port.requests.push_back({sources_[position], ""});
+  }
 }
 
 std::optional<LeftoverSubscriptions::Request> LeftoverSubscriptions::next(std::int64_t now_ns) {
-  for (std::size_t i = 0; i < ports_.size(); ++i) {
-    Port& port = ports_[i];
-    if (port.sent < requestsOf(port)) {
-      const std::size_t index = port.sent++;
+  for (Port& port : ports_) {
+    if (!port.requests.empty()) {
       last_sent_ns_ = now_ns;
-      const std::vector<std::string>& datarefs = port.subscription.datarefs;
-      return Request{sources_[i], index < datarefs.size() ? datarefs[index] : "", static_cast<std::int32_t>(index)};
+      Request request = std::move(port.requests.front());
+      port.requests.pop_front();
+      return request;
     }
   }
   return std::nullopt;
 }
 
-void LeftoverSubscriptions::heard(std::size_t position, std::int64_t now_ns) {
+void LeftoverSubscriptions::heard(std::size_t position, ByteView datagram, std::int64_t now_ns) {
   // Before that, X-Plane may have sent it without having read the requests.
   constexpr std::int64_t kUnderWayNs = 300 * kNanosecondsPerMillisecond;
-  if (now_ns - last_sent_ns_ > kUnderWayNs) {
-    ports_[position].heard = true;
+  if (now_ns - last_sent_ns_ <= kUnderWayNs) {
+    return;
+  }
+  Port& port = ports_[position];
+  port.heard = true;
+  const DecodeResult<RrefView> values = decodeRref(datagram);
+  for (std::size_t i = 0; values.ok() && i < values->size(); ++i) {
+    const std::int32_t index = (*values)[i].index;
+    if (index < 0 || static_cast<std::size_t>(index) >= port.subscription.datarefs.size()) {
+      port.unnamed.insert(index);
+    }
   }
 }
 
@@ -86,12 +107,13 @@ void LeftoverSubscriptions::update(std::int64_t now_ns) {
   }
   bool again = false;
   bool undone = true;
-  for (Port& port : ports_) {
+  for (std::size_t i = 0; i < ports_.size(); ++i) {
+    Port& port = ports_[i];
     if (port.heard) {
       undone = false;
       if (port.attempts < kMaxAttempts) {
         ++port.attempts;
-        port.sent = 0;
+        ask(i);
         again = true;
       }
     }

@@ -214,7 +214,8 @@ void SimLink::receiveXpc() {
 
 void SimLink::receiveLeftovers() {
   for (std::size_t i = 0; i < leftovers_.sources().size(); ++i) {
-    drain(leftovers_.sources()[i].get(), [this, i](ByteView, const Received&) { leftovers_.heard(i, now_ns_); });
+    drain(leftovers_.sources()[i].get(),
+          [this, i](ByteView bytes, const Received&) { leftovers_.heard(i, bytes, now_ns_); });
   }
 }
 

@@ -444,15 +444,15 @@ def asked(id_: str, *ports: int) -> Dict[str, Any]:
     return entry(id_, subscriptions=[{"port": port, "datarefs": datarefs, "rpos": False} for port in ports])
 
 
-def test_subscriptions_of_which_a_request_is_lost_are_asked_for_again(
+def test_subscriptions_of_which_a_request_is_lost_or_that_no_journal_has_are_ended(
     release_from: Callable[..., Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    port, quiet = free_udp_port(), free_udp_port()
-    xplane = Sending({port: (0, 1)}, lost=1)
+    port, quiet, read = free_udp_port(), free_udp_port(), 1063  # what was being read is in no journal
+    xplane = Sending({port: (0, 1, read)}, lost=1)
     file = write(tmp_path / f"127.0.0.1_{xplane.port}_subscriptions.json", asked("s:/rx_node", port, quiet))
     code, took_s = release_from(xplane)
     assert xplane.goes_on == set()
-    assert xplane.requests == [(port, 0), (port, 1), (quiet, 0), (quiet, 1), (port, 0), (port, 1)]
+    assert xplane.requests == [(port, 0), (port, 1), (quiet, 0), (quiet, 1), (port, 0), (port, 1), (port, read)]
     assert (code, file.exists()) == (0, False)
     assert took_s == pytest.approx(3.0)
     assert capsys.readouterr().out.endswith("4 subscriptions of /tx_node, process 1: ended\n")

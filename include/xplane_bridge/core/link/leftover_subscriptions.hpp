@@ -2,15 +2,18 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "xplane_bridge/core/base/log.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
 #include "xplane_bridge/core/wire/datagram_source.hpp"
+#include "xplane_bridge/core/wire/packets.hpp"
 
 namespace xplane_bridge::core {
 
@@ -18,6 +21,7 @@ constexpr const char* kSubscriptionsPurpose = "subscriptions";
 
 /// Ends what a node that was killed has left subscribed in X-Plane, which otherwise sends to the dead port until it is
 /// quit: opens each port that the journal names, asks for nothing any more from there, and listens whether that helps.
+/// What was being read when it was killed is in no journal: that ends by the indices that still come.
 /// No I/O of its own except the journal's. Times are the steady clock's [ns].
 class LeftoverSubscriptions {
  public:
@@ -36,21 +40,22 @@ class LeftoverSubscriptions {
   void linkUp(std::shared_ptr<Journal> journal, std::int64_t now_ns);
   /// The next request to send; empty: none at the moment. What is taken is sent.
   std::optional<Request> next(std::int64_t now_ns);
-  /// All sources, to be emptied; heard() with the position of each that had something.
+  /// All sources, to be emptied; heard() with the position of its source for each datagram.
   const std::vector<std::shared_ptr<DatagramSource>>& sources() const { return sources_; }
-  void heard(std::size_t position, std::int64_t now_ns);
+  void heard(std::size_t position, ByteView datagram, std::int64_t now_ns);
   /// Call regularly while X-Plane answers: gives the ports back once nothing comes any more.
   void update(std::int64_t now_ns);
 
  private:
   struct Port {
     JournalSubscription subscription;
-    std::size_t sent = 0;  // requests, of this attempt
+    std::deque<Request> requests;    // of this attempt, still to be sent
+    std::set<std::int32_t> unnamed;  // indices that came and that the journal does not have
     int attempts = 1;
     bool heard = false;  // since it was asked to stop
   };
 
-  std::size_t requestsOf(const Port& port) const;
+  void ask(std::size_t position);
   void finish(bool undone);
 
   Open open_;

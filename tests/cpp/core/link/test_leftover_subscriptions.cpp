@@ -101,6 +101,21 @@ TEST_F(LeftoverSubscriptionsTest, LostRequestsAreSentAgain) {
   EXPECT_GE(runUntil([&] { return sentTo(sim, port).empty(); }, 3.0, {&sim}), 0.0);
 }
 
+TEST_F(LeftoverSubscriptionsTest, WhatWasBeingReadEndsThoughNoJournalHasIt) {
+  constexpr std::int32_t kReadIndex = 1000;
+  FakeXPlane sim;
+  sim.datarefs["a/b"] = 1.0F;
+  const std::uint16_t port = freePort();
+  sim.subscriptions[{INADDR_LOOPBACK, port}] = {{0, "a/b"}, {kReadIndex, "a/b"}, {kReadIndex + 63, "a/b"}};
+  journalOf(sim, killed("/test")).record("subscriptions:/test:1", kSubscriptionsPurpose, {}, {{port, {"a/b"}}});
+  makeLink(optionsFor(sim));
+  EXPECT_GE(runUntil([&] { return sentTo(sim, port).empty(); }, 4.0, {&sim}), 0.0);
+  run(3.0, {&sim});
+  const std::vector<JournalEntry> entries = journalOf(sim, thisProcess("/test")).entries();
+  ASSERT_EQ(entries.size(), 1U);
+  EXPECT_EQ(entries[0].owner, thisProcess("/test")) << "this run's own";
+}
+
 TEST_F(LeftoverSubscriptionsTest, APortThatAnotherProgramHasNowIsSaid) {
   FakeXPlane sim;
   const UdpSocket taken{UdpSocketOptions()};
