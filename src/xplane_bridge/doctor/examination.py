@@ -28,6 +28,8 @@ from xplane_bridge.doctor.settings import Settings
 
 #: Each of the two rounds of observations gets so long [s]; the second needs to know where X-Plane is.
 _ROUND_S = 6.0
+#: An observation that is to end takes less than this [s]: it ends its subscriptions in batches.
+_END_S = 1.0
 #: Observations whose names say too little to users.
 _SAID = {
     "answers": "X-Plane",
@@ -62,8 +64,13 @@ def examine(settings: Settings) -> Evidence:
         heard = seen.get("beacons", beacons.BeaconWatch())
         where = _Round({"target": (target.choose, settings, parameters, heard)}, limit_s=1.5).results(unfinished)
         chosen = where.get("target", target.Target(settings.host, "", settings.port))
-        second = _Round(_second_round(settings, chosen, _data_port(parameters)))
-        seen.update(second.results(unfinished))
+        ending = threading.Event()
+        second = _Round(_second_round(settings, chosen, _data_port(parameters), ending.is_set))
+        try:
+            seen.update(second.results(unfinished))
+        finally:  # by Ctrl-C as well: X-Plane would go on sending to a port that no program has
+            ending.set()
+            second.join("answers", _END_S)
     return Evidence(
         settings=settings,
         target=chosen,
@@ -95,7 +102,9 @@ def _data_port(parameters: Dict[str, Any]) -> int:
     return port if isinstance(port, int) and 0 < port < 65536 else protocol.DATA_TARGET_PORT
 
 
-def _second_round(settings: Settings, chosen: target.Target, data_port: int) -> Dict[str, Tuple[Any, ...]]:
+def _second_round(
+    settings: Settings, chosen: target.Target, data_port: int, ends: Callable[[], bool]
+) -> Dict[str, Tuple[Any, ...]]:
     looked_at = {protocol.DATA_SOURCE_PORT, data_port, settings.beacon_port}
     listened_to = [data_port]
     if chosen.here:
@@ -108,7 +117,7 @@ def _second_round(settings: Settings, chosen: target.Target, data_port: int) -> 
         "data": (data_output.watch, listened_to, settings.answer_s),
     }
     if chosen.address:
-        jobs["answers"] = (simulator.ask, chosen.address, chosen.port, settings.answer_s)
+        jobs["answers"] = (simulator.ask, chosen.address, chosen.port, settings.answer_s, ends)
     return jobs
 
 
@@ -142,6 +151,11 @@ class _Round:
             if name not in self._results:
                 unfinished[name] = self._errors.get(name, "it took too long")
         return {name: self._results[name] for name in self._threads if name not in unfinished}
+
+    def join(self, name: str, limit_s: float) -> None:
+        """Waits for the end of one of them, where there is such a one, for some time [s] at most."""
+        if name in self._threads:
+            self._threads[name].join(limit_s)
 
     def _run(self, name: str, function: Callable[..., Any], *arguments: Any) -> None:
         try:

@@ -5,6 +5,8 @@ import socket
 import subprocess
 import sys
 import threading
+import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -182,7 +184,7 @@ def test_what_x_plane_has_is_read_and_all_subscriptions_end(monkeypatch):
         assert not xplane.others, "the doctor writes nothing"
 
 
-def test_requests_come_in_batches_that_one_frame_takes():
+def test_requests_come_in_batches_that_one_frame_takes(monkeypatch):
     """Of more than about 148 requests in a frame X-Plane loses some."""
     batches = [0]
 
@@ -190,10 +192,11 @@ def test_requests_come_in_batches_that_one_frame_takes():
         def _send(self, _datagram):
             batches[-1] += 1
 
-        def watch(self, duration_s):
-            assert duration_s >= 1 / 20, "frames last up to 1/20 s: below that rate X-Plane slows its time"
-            batches.append(0)
+    def sleep(duration_s):
+        assert duration_s >= 1 / 20, "frames last up to 1/20 s: below that rate X-Plane slows its time"
+        batches.append(0)
 
+    monkeypatch.setattr(simulator, "time", SimpleNamespace(monotonic=time.monotonic, sleep=sleep))
     with Counted("127.0.0.1", free_udp_port()) as questions:
         questions.ask([f"sim/{number}" for number in range(250)], 0.5)
         assert batches == [100, 100, 50]
@@ -204,6 +207,13 @@ def test_answers_from_another_address_are_taken_and_reported():
         answers = simulator.ask("127.0.0.1", xplane.port, WAIT_S)
     assert answers.any
     assert list(answers.sources) == [("127.0.0.2", xplane.port)]
+
+
+def test_it_asks_no_longer_where_it_is_to_end_and_ends_its_subscriptions():
+    with FakeXPlane({}) as xplane:
+        answers = simulator.ask("127.0.0.1", xplane.port, 10 * WAIT_S, lambda: any(xplane.subscriptions.values()))
+        wait_until(lambda: not any(xplane.subscriptions.values()), WAIT_S, "end of all subscriptions")
+    assert not answers.any
 
 
 def test_nothing_listening_is_distinguished_from_silence():

@@ -4,6 +4,7 @@ import dataclasses
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import threading
@@ -22,6 +23,7 @@ from xplane_bridge.doctor.evidence import Evidence
 from xplane_bridge.doctor.finding import Severity, note, ok, problem, warning
 from xplane_bridge.doctor.observe import joysticks
 from xplane_bridge.doctor.settings import Settings
+from xplane_bridge.harness import wait_until
 from xplane_bridge.harness.ports import free_udp_port
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -91,6 +93,16 @@ def test_a_simulator_that_flies_is_found_well(tmp_path):
     assert found["answer"]["severity"] == "ok"
     assert found["version"]["facts"] == {"version": 115501}
     assert done.returncode == any(finding["severity"] in ("warning", "problem") for finding in found.values())
+
+
+def test_ctrl_c_ends_it_with_its_subscriptions(tmp_path):
+    with FakeXPlane({}) as xplane:
+        command = [sys.executable, DOCTOR, "--host", "127.0.0.1", "--port", str(xplane.port)]
+        with subprocess.Popen(command, env={**os.environ, "HOME": str(tmp_path)}, stderr=subprocess.PIPE) as doctor:
+            wait_until(lambda: any(xplane.subscriptions.values()), WAIT_S, "the first subscription")
+            doctor.send_signal(signal.SIGINT)
+            assert (doctor.wait(PROGRAM_S), doctor.stderr.read()) == (130, b"")
+        wait_until(lambda: not any(xplane.subscriptions.values()), WAIT_S, "end of all subscriptions")
 
 
 def test_nothing_on_the_port_is_a_finding_in_words(tmp_path):

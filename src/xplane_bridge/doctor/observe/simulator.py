@@ -25,6 +25,8 @@ _REPEAT_S = 0.6
 _WATCH_S = 0.7
 #: What is not answered this long after the first answer is taken not to exist in this version.
 _MORE_S = 1.2
+#: So soon it is noticed that it is to end [s].
+_NOTICED_S = 0.1
 _UNREACHABLE = (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.EHOSTDOWN, errno.ENETDOWN)
 
 
@@ -58,10 +60,12 @@ class Questions:
     Args:
         address: IPv4 address.
         port: UDP port X-Plane listens on.
+        ends: Whether to ask and watch no longer; asked about ten times a second.
     """
 
-    def __init__(self, address: str, port: int) -> None:
+    def __init__(self, address: str, port: int, ends: Callable[[], bool] = lambda: False) -> None:
         self._to = (address, port)
+        self._ends = ends
         # Not connected: X-Plane may answer from another address of its computer.
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         # Connected: only such a socket gets ICMP's answers, and that on all systems.
@@ -98,7 +102,7 @@ class Questions:
         self._paths.update(zip(asked, paths))
         end = time.monotonic() + patience_s
         repeat = 0.0
-        while time.monotonic() < end and not enough():
+        while time.monotonic() < end and not enough() and not self._ends():
             missing = [index for index in asked if self._paths[index] not in self._answers.values]
             if not missing:
                 return
@@ -110,13 +114,13 @@ class Questions:
     def watch(self, duration_s: float) -> None:
         """Takes further answers for some time [s]."""
         end = time.monotonic() + duration_s
-        while time.monotonic() < end:
+        while time.monotonic() < end and not self._ends():
             self._receive(end)
 
     def _request(self, indexes: List[int], rate_hz: int) -> None:
         for start in range(0, len(indexes), _BATCH):
             if start:
-                self.watch(_BETWEEN_BATCHES_S)
+                time.sleep(_BETWEEN_BATCHES_S)  # answers wait in the socket
             for index in indexes[start : start + _BATCH]:
                 self._send(protocol.RrefRequest(rate_hz, index, self._paths[index]).encode())
         self._probe_port()
@@ -136,8 +140,8 @@ class Questions:
             self._failed(error)
 
     def _receive(self, until: float) -> None:
-        """Takes what comes next, until a point of the monotonic clock [s] at the latest."""
-        wait = max(0.0, until - time.monotonic())
+        """Takes what comes next, for a moment and until a point of the monotonic clock [s] at the latest."""
+        wait = min(_NOTICED_S, max(0.0, until - time.monotonic()))
         ready, _, _ = select.select([self._socket, self._probe], [], [], wait)
         for receiver in ready:
             try:
@@ -164,15 +168,16 @@ class Questions:
             self._unreachable = error.strerror or str(error)
 
 
-def ask(address: str, port: int, patience_s: float) -> Answers:
+def ask(address: str, port: int, patience_s: float, ends: Callable[[], bool] = lambda: False) -> Answers:
     """Asks an X-Plane what the checks need to know.
 
     Args:
         address: IPv4 address.
         port: UDP port X-Plane listens on.
         patience_s: How long the first answer is waited for [s].
+        ends: Whether to go on no longer; subscriptions are ended then, too.
     """
-    with Questions(address, port) as questions:
+    with Questions(address, port, ends) as questions:
         questions.ask(names.BASIC, patience_s, enough=lambda: questions.answers.any)
         if questions.answers.any:
             questions.watch(_WATCH_S)
