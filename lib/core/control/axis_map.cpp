@@ -13,6 +13,9 @@ namespace {
 
 // Drivers divide by 32767 or 32768, so full travel may come out a little above 1.
 constexpr double kAxisTolerance = 1e-3;
+// A command that differs by so little for so long [s] is a change to tx_node, which sends the handle again.
+constexpr double kNudge = 1e-6;
+constexpr double kNudgeTime = 0.1;
 
 const JoyTargetRow& rowOf(JoyTarget target) {
   return *std::find_if(std::begin(kJoyTargets), std::end(kJoyTargets),
@@ -29,6 +32,10 @@ void command(JoyTarget target, double value, ControlCommand& out) {
   } else {
     out.*row.value = saturated;
   }
+}
+
+double commanded(JoyTarget target, const ControlCommand& in) {
+  return target == JoyTarget::kBrakes ? in.left_brake : in.*rowOf(target).value;
 }
 
 std::string rangeText(ChannelRange range) {
@@ -195,8 +202,8 @@ void TravelIntegrator::integrate(double rate, double j, double dt) {
   fraction_ = std::clamp(fraction_ + rate * j * dt, 0.0, 1.0);
 }
 
-double TravelIntegrator::value() const {
-  const double value = std::clamp(low_ + fraction_ * (high_ - low_), low_, high_);
+double TravelIntegrator::valueAt(double fraction) const {
+  const double value = std::clamp(low_ + fraction * (high_ - low_), low_, high_);
   if (detents_.empty()) return value;
   return *std::min_element(detents_.begin(), detents_.end(),
                            [value](double a, double b) { return std::abs(a - value) < std::abs(b - value); });
@@ -339,6 +346,22 @@ void JoystickMapper::releaseSurfaces() {
   chosen_surface_.reset();
 }
 
+/// A press on what is commanded already: the cockpit may have moved it since.
+void JoystickMapper::askAgain(JoyTarget target, double value, double now) {
+  if ((last_.fields & rowOf(target).field) == 0u || commanded(target, last_) != value) return;
+  nudged_until_[target] = now + kNudgeTime;
+}
+
+void JoystickMapper::settleHats(double now, bool edges) {
+  for (std::size_t i = 0; i < integrated_.size(); ++i) {
+    const IntegratedInput& in = options_.integrated[i];
+    Integrated& hat = integrated_[i];
+    const double j = selected_of_group_[hat.group] == i ? source(in) : 0.0;
+    if (edges && !hat.pushed && j != 0.0 && hat.state.isAtEnd(in.rate * j)) askAgain(in.target, hat.state.value(), now);
+    hat.pushed = j != 0.0;
+  }
+}
+
 void JoystickMapper::settleButtons(double now, bool edges) {
   for (std::size_t i = 0; i < buttons_.size(); ++i) {
     Button& button = buttons_[i];
@@ -346,11 +369,11 @@ void JoystickMapper::settleButtons(double now, bool edges) {
     if (edges && now - button.changed < options_.debounce) continue;
     button.pressed = button.raw;
     button.changed = now;
-    if (edges && button.pressed) onPress(static_cast<int>(i));
+    if (edges && button.pressed) onPress(static_cast<int>(i), now);
   }
 }
 
-void JoystickMapper::onPress(int button) {
+void JoystickMapper::onPress(int button, double now) {
   for (std::size_t i = 0; i < integrated_.size(); ++i) {
     if (options_.integrated[i].select_button == button) selected_of_group_[integrated_[i].group] = i;
   }
@@ -361,6 +384,7 @@ void JoystickMapper::onPress(int button) {
       if (options_.buttons[k].target == options_.buttons[i].target) button_used_[k] = 0;
     }
     button_used_[i] = 1;
+    askAgain(options_.buttons[i].target, options_.buttons[i].value, now);
   }
   chooseSurface(button);
   for (std::size_t i = 0; i < options_.actions.size(); ++i) {
@@ -390,6 +414,7 @@ bool JoystickMapper::onJoy(const std::vector<float>& axes, const std::vector<std
   for (std::size_t i = 0; i < buttons.size(); ++i) buttons_[i].raw = buttons[i] != 0;
   // What is held down when the device appears was not pressed for us, and its levers read 0 until they are touched.
   settleButtons(now, !first);
+  settleHats(now, !first);
   if (first) {
     std::fill(direct_moved_.begin(), direct_moved_.end(), '\0');
     releaseSurfaces();
@@ -431,6 +456,13 @@ JoystickCommand JoystickMapper::update(double now) {
     const ButtonInput& in = options_.buttons[i];
     if (!button_used_[i]) continue;
     command(in.target, pressed(in.button) || !in.released ? in.value : *in.released, out.command);
+  }
+  last_ = out.command;
+  for (const auto& [target, until] : nudged_until_) {
+    if (now >= until) continue;
+    const ChannelRange range = commandRange(target);
+    const double value = commanded(target, last_);
+    command(target, value > 0.5 * (range.low + range.high) ? value - kNudge : value + kNudge, out.command);
   }
   for (std::size_t i = 0; i < surfaces_.size(); ++i) {
     if (surfaces_[i].commanded) out.surfaces.push_back({options_.surfaces[i].name, surfaces_[i].deflection_deg});

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -133,10 +134,14 @@ class TravelIntegrator {
   /// Adds rate * j * dt. rate [1/s], dt [s] >= 0.
   void integrate(double rate, double j, double dt);
   /// map and sat: the fraction as a value in [low, high], at the nearest detent where there are any.
-  double value() const;
+  double value() const { return valueAt(fraction_); }
+  /// Whether going on at this rate would leave the value as it is.
+  bool isAtEnd(double rate) const { return value() == valueAt(rate > 0.0 ? 1.0 : 0.0); }
   double fraction() const { return fraction_; }
 
  private:
+  double valueAt(double fraction) const;
+
   double low_, high_, fraction_;
   std::vector<double> detents_;
 };
@@ -202,6 +207,7 @@ class JoystickMapper {
     TravelIntegrator state;
     std::size_t group;
     bool moved = false;
+    bool pushed = false;
   };
 
   struct Surface {
@@ -220,7 +226,9 @@ class JoystickMapper {
   double source(const Input& input) const;
   void integrateUpTo(double now);
   void settleButtons(double now, bool edges);
-  void onPress(int button);
+  void settleHats(double now, bool edges);
+  void onPress(int button, double now);
+  void askAgain(JoyTarget target, double value, double now);
 
   void moveSurface(double dt);
   void chooseSurface(int button);
@@ -233,6 +241,8 @@ class JoystickMapper {
   std::vector<std::size_t> selected_of_group_;
   std::vector<char> direct_moved_;
   std::vector<char> button_used_;
+  ControlCommand last_;                       // as of the last update, without nudges
+  std::map<JoyTarget, double> nudged_until_;  // [s]
   std::vector<Surface> surfaces_;
   std::optional<std::size_t> chosen_surface_;
   std::vector<FlightMode> requests_;

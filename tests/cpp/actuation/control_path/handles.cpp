@@ -5,6 +5,8 @@
 namespace xplane_bridge {
 namespace {
 
+constexpr const char* kGearHandle = "sim/cockpit2/controls/gear_handle_down";
+
 class HandlesTest : public ControlPathTest {
  protected:
   static core::ControlCommand rollAndFlaps(double roll, double flaps) {
@@ -68,6 +70,25 @@ TEST_F(HandlesTest, OneThatIsCommandedAnewIsSentThoughItIsTheSame) {
   ASSERT_FLOAT_EQ(sim.value(kFlapHandle), 0.0F) << "held";
   runWith(rollAndFlaps(0.25, 0.5), 0.1);
   EXPECT_FLOAT_EQ(sim.value(kFlapHandle), 0.5F);
+}
+
+TEST_F(HandlesTest, TheLeastChangeOfItsCommandSendsItAgain) {
+  start();
+  core::ControlCommand command = rollAndFlaps(0.25, 1.0);
+  command.fields |= core::kFieldGear;
+  runWith(command, 1.0);
+  sim.set(kFlapHandle, 0.0F);
+  sim.set(kGearHandle, 1.0F);
+  runWith(command, 1.0);
+  ASSERT_FLOAT_EQ(sim.value(kGearHandle), 1.0F);
+  core::ControlCommand pressed_again = command;  // as joystick_mapper_node does
+  pressed_again.flaps = 0.999999F;
+  pressed_again.gear = 1e-6F;
+  runWith(pressed_again, 0.02);
+  EXPECT_EQ(sim.value(kGearHandle), 0.0F) << "up or down, nothing between them";
+  runWith(command, 0.5);
+  EXPECT_EQ(sim.value(kFlapHandle), 1.0F);
+  EXPECT_EQ(path->notFollowed(), Texts{});
 }
 
 TEST_F(HandlesTest, AChangeOfTheModeAloneSendsNone) {

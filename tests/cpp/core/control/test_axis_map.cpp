@@ -89,6 +89,8 @@ TEST(AxisMap, LeverThatReadsZeroUntilTouchedCommandsNothingUntilThen) {
   JoystickMapper mapper(o);
   mapper.onJoy({0.0f, 0.0f}, {}, 0.0);
   EXPECT_EQ(mapper.update(0.0).command.fields, static_cast<std::uint32_t>(kFieldRoll));
+  mapper.onJoy({std::numeric_limits<float>::min(), 0.0f}, {}, 0.05);  // as the virtual stick's lever in its middle
+  EXPECT_EQ(mapper.update(0.05).command.throttle, 0.5);
   mapper.onJoy({-0.6f, 0.0f}, {}, 0.1);
   EXPECT_NEAR(mapper.update(0.1).command.throttle, 0.2, 1e-7);
   mapper.onJoy({0.0f, 0.0f}, {}, 0.2);  // now a real zero
