@@ -16,8 +16,13 @@ from xplane_bridge.errors import text_problem, yaml_problem
 from xplane_bridge.scenario.player import Commands
 from xplane_bridge.scenario.schema import Scenario, ScenarioError
 
+#: A device whose file names higher axes has more of them.
 AXIS_COUNT, BUTTON_COUNT = 8, 12
 _GRID = np.linspace(0.0, 1.0, 2001)
+#: An axis that has been moved, and back to its middle; too small to be seen in a command.
+_TOUCHED = float(np.finfo(np.float32).tiny)
+#: Of numbers that come from ramps and scales.
+_ROUNDING = 1e-9
 #: Handles that a device moves while something is pressed, not to a value: a script cannot say them through a stick.
 _SPRUNG = 0.0
 
@@ -41,13 +46,14 @@ class VirtualStick:
         for axis in ("roll", "pitch", "yaw", "throttle"):
             if axis in direct:
                 key, entry = direct[axis]
-                index = entry.get("axis", entry.get(f"axis_mode_{mode}"))
-                if index is None or int(index) < 0:
+                index = _axis_index(entry, mode)
+                if index < 0:
                     raise ScenarioError(f"{self.name}: direct.{key} names no axis")
-                self._axes[axis] = (int(index), entry)
+                self._axes[axis] = (index, entry)
         for axis in ("roll", "pitch", "yaw"):
             if axis not in self._axes:
                 raise ScenarioError(f"{self.name}: direct.{axis} is missing; a virtual stick needs it")
+        self._axis_count = _axis_count(device, mode)
         #: By target and whether the handle is far from 0 while they are pressed.
         self._buttons = {
             (str(entry.get("target", key)), float(entry.get("value", 1.0)) >= 0.5): int(entry["button"])
@@ -73,17 +79,17 @@ class VirtualStick:
         """Axes [-1..1] and buttons of a sensor_msgs/Joy.
 
         Raises:
-            ScenarioError: The scenario moves something that this device cannot move to a value.
+            ScenarioError: The scenario moves something that this device cannot move, or not so far.
         """
-        axes, buttons = [0.0] * AXIS_COUNT, [0] * BUTTON_COUNT
-        for axis, value in commands.stick.items():
-            index, entry = self._axes[axis]
-            axes[index] = _inverse(value, entry)
+        axes, buttons = [0.0] * self._axis_count, [0] * BUTTON_COUNT
+        moved = dict(commands.stick)
         if commands.throttle is not None:
             if not self._throttle_axis_known:
                 raise ScenarioError(f"{self.name}: its throttle has no lever, which a scenario needs")
-            index, entry = self._axes["throttle"]
-            axes[index] = _inverse(commands.throttle, entry)
+            moved["throttle"] = commands.throttle
+        for axis, value in moved.items():
+            index, entry = self._axes[axis]
+            axes[index] = self._position(axis, value, entry)
         pressed = set(commands.buttons)
         for handle, value in commands.handles.items():
             button = self._handle_button(handle, value)
@@ -94,6 +100,17 @@ class VirtualStick:
                 raise ScenarioError(f"{self.name}: button {button}; expected 0 to {BUTTON_COUNT - 1}")
             buttons[button] = 1
         return axes, buttons
+
+    def _position(self, axis: str, value: float, entry: Dict[str, Any]) -> float:
+        """Where the device's axis is when it commands `value`."""
+        low, high = _reach(entry)
+        if not low - _ROUNDING <= value <= high + _ROUNDING:
+            raise ScenarioError(
+                f"{self.name}: {axis} at {value:g}: its axis gives {low:g} to {high:g}; fly this scenario with "
+                "commands instead of a stick"
+            )
+        position = _inverse(value, entry)
+        return _TOUCHED if position == 0.0 and entry.get("silent_until_moved") else position
 
     def _handle_button(self, handle: str, value: float) -> Optional[int]:
         if handle == "gear" or (handle == "brakes" and (handle, True) in self._buttons):
@@ -148,6 +165,25 @@ def load_stick(file: Path, stick_mode: Optional[int] = None) -> VirtualStick:
     if not isinstance(device, dict):
         raise ScenarioError(f"{file}: expected a mapping with device, direct, ...")
     return VirtualStick(device, stick_mode)
+
+
+def _axis_index(entry: Dict[str, Any], mode: int) -> int:
+    """Below 0: none."""
+    index = entry.get("axis", entry.get(f"axis_mode_{mode}"))
+    return -1 if index is None else int(index)
+
+
+def _axis_count(device: Dict[str, Any], mode: int) -> int:
+    entries = [entry for section in ("direct", "integrated", "surfaces") for entry in device.get(section, {}).values()]
+    return max(AXIS_COUNT, *(_axis_index(entry, mode) + 1 for entry in entries))
+
+
+def _reach(entry: Dict[str, Any]) -> Tuple[float, float]:
+    """The ends of what equation (1) makes of the axis."""
+    reach = min(abs(float(entry.get("scale", 1.0))), 1.0)
+    if entry.get("travel") == "full":
+        return 0.5 * (1.0 - reach), 0.5 * (1.0 + reach)
+    return (0.0 if entry.get("travel") == "positive" else -reach), reach
 
 
 @functools.lru_cache(maxsize=None)

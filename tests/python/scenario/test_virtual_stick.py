@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import yaml
 
@@ -45,6 +46,53 @@ def test_a_lever_is_moved_over_its_whole_travel(throttle):
     axes, _ = VirtualStick(content).joy(Commands(throttle=throttle))
     entry = content["direct"]["throttle"]
     assert equation_1(axes[entry["axis"]], entry) == pytest.approx(throttle, abs=2e-3)
+
+
+@pytest.mark.parametrize("dead_zone", [0.0, 0.1])
+def test_a_lever_in_its_middle_has_been_moved(dead_zone):
+    content = device(LEVER)
+    entry = content["direct"]["throttle"]
+    entry["dead_zone"] = dead_zone
+    stick = VirtualStick(content)
+    assert stick.joy(Commands())[0][entry["axis"]] == 0.0, "the scenario has not moved it yet"
+    sent = float(np.float32(stick.joy(Commands(throttle=0.5))[0][entry["axis"]]))
+    assert sent != 0.0, "the mapper commands nothing while it is silent_until_moved"
+    assert equation_1(sent, entry) == 0.5
+    assert stick.joy(Commands())[0][content["direct"]["roll"]["axis"]] == 0.0
+
+
+def test_a_device_has_all_axes_that_its_file_names():
+    content = device(LEVER)
+    content["direct"]["yaw"]["axis"] = 9
+    content["integrated"]["flaps"]["axis"] = 11
+    axes, _ = VirtualStick(content).joy(Commands(stick={"roll": 0.0, "pitch": 0.0, "yaw": 0.5}))
+    assert len(axes) == 12
+    assert equation_1(axes[9], content["direct"]["yaw"]) == pytest.approx(0.5, abs=2e-3)
+    assert len(VirtualStick(device(LEVER)).joy(Commands())[0]) == 8
+
+
+@pytest.mark.parametrize(
+    ("changed", "commands", "part"),
+    [
+        ({}, Commands(throttle=-0.5), r"throttle at -0\.5: its axis gives 0 to 1; fly .* commands"),
+        ({"travel": "positive"}, Commands(throttle=-0.5), "its axis gives 0 to 1;"),
+        ({"scale": 0.5}, Commands(throttle=0.8), r"throttle at 0\.8: its axis gives 0\.25 to 0\.75;"),
+        ({"scale": -0.5, "travel": "symmetric"}, Commands(throttle=-0.6), r"gives -0\.5 to 0\.5;"),
+        ({"scale": 2.0, "travel": "symmetric"}, Commands(throttle=-1.0), None),
+        ({"travel": "symmetric"}, Commands(throttle=-1.0), None),
+        ({"scale": 0.6}, Commands(throttle=0.2 - 1e-12), None),
+    ],
+)
+def test_a_value_beyond_the_travel_of_its_axis_is_said(changed, commands, part):
+    content = device(LEVER)
+    entry = content["direct"]["throttle"]
+    entry.update(changed)
+    if part is None:
+        axes, _ = VirtualStick(content).joy(commands)
+        assert equation_1(axes[entry["axis"]], entry) == pytest.approx(commands.throttle, abs=2e-3)
+        return
+    with pytest.raises(ScenarioError, match=part):
+        VirtualStick(content).joy(commands)
 
 
 def test_buttons_for_modes_gear_and_brakes():
