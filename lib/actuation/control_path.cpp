@@ -1,6 +1,5 @@
 #include "xplane_bridge/actuation/control_path.hpp"
 
-#include <algorithm>
 #include <utility>
 
 #include "xplane_bridge/actuation/link_condition.hpp"
@@ -424,12 +423,7 @@ void ControlPath::publishMode() {
 // --- what is ---
 
 bool ControlPath::fits(const core::AircraftIdentity& aircraft) const {
-  const std::vector<std::string>& known = options_.aircraft;
-  if (known.empty()) return true;
-  const auto listed = [&known](const std::string& text) {
-    return !text.empty() && std::find(known.begin(), known.end(), text) != known.end();
-  };
-  return listed(aircraft.icao) || listed(aircraft.description);
+  return options_.aircraft.empty() || core::isListed(aircraft, options_.aircraft);
 }
 
 Standing ControlPath::standing() const {

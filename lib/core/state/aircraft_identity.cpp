@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <string_view>
 #include <utility>
 
 namespace xplane_bridge::core {
@@ -40,9 +41,23 @@ std::string textFrom(const std::vector<float>& values, std::size_t first, std::s
   return end == std::string::npos ? "" : text.substr(0, end + 1);
 }
 
+std::string_view withoutBlanks(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(' ');
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(' ') + 1 - first);
+}
+
 }  // namespace
 
 std::string described(const AircraftIdentity& aircraft) { return aircraft.icao + " (" + aircraft.description + ")"; }
+
+bool isListed(const AircraftIdentity& aircraft, const std::vector<std::string>& identities) {
+  const std::string_view icao = withoutBlanks(aircraft.icao), description = withoutBlanks(aircraft.description);
+  return std::any_of(identities.begin(), identities.end(), [&](const std::string& identity) {
+    const std::string_view text = withoutBlanks(identity);
+    return !text.empty() && (text == icao || text == description);
+  });
+}
 
 AircraftIdentityReader::AircraftIdentityReader()
     : frames_(datarefs().size(), 0, RrefFrameAssembler::Options::joinedWithin(kJoinWindow)) {}

@@ -160,4 +160,4 @@ def _text(values: Mapping[str, float], name: str) -> str:
         if not 1.0 <= code <= 255.0:
             break
         letters.append(chr(int(code)) if 32 <= code < 127 else "?")
-    return "".join(letters).strip()
+    return "".join(letters).rstrip(" ")  # as tx_node reads it

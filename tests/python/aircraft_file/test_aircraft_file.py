@@ -84,6 +84,8 @@ def test_texts_end_at_their_zero_and_what_cannot_be_printed_is_a_question_mark()
     values[f"{ICAO}[5]"] = 65.0  # behind the end
     seen = taken(115501, values)
     assert (seen.icao, seen.description, seen.path) == ("BE58", "Bar?on", "")
+    seen = taken(115501, {**text(DESCRIPTION, " My Glider "), observed.ENGINES: 1.0})
+    assert seen.description == " My Glider", "as tx_node reads it"
     with pytest.raises(NotSeenError, match="load one"):
         taken(115501, {})
 

@@ -17,6 +17,7 @@ TWIN, QUAD = {"fixed_wing": ["DA62", "BE58"]}, {"multirotor": ["QUAD"]}
         ({"anything": []}, "B738", ""),
         ({}, "B738", ""),
         ({"toy": ["a toy"]}, "", ""),  # by its description, as it has no code
+        ({"toy": [" a toy "]}, "", ""),
         ({"nothing": [""]}, "", "but the aircraft loaded is one without"),
         (TWIN, "QUAD", "this is for fixed_wing (DA62, BE58), but the aircraft loaded is QUAD (a toy)"),
         ({**TWIN, **QUAD}, "B738", "fixed_wing (DA62, BE58) or multirotor (QUAD), but the aircraft loaded is B738"),

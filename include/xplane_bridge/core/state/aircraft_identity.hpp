@@ -23,6 +23,10 @@ struct AircraftIdentity {
 /// For people: "BE58 (Baron)".
 std::string described(const AircraftIdentity& aircraft);
 
+/// Whether one of these is its ICAO code or its description. Blanks at the ends do not count: an aircraft's file may
+/// lack those with which the description begins.
+bool isListed(const AircraftIdentity& aircraft, const std::vector<std::string>& identities);
+
 /// Puts the identity together from RREF replies: X-Plane sends a byte[] dataref one character a value.
 class AircraftIdentityReader {
  public:

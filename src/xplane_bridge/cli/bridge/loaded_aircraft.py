@@ -44,8 +44,9 @@ def identities_of(names: Sequence[str], bridge_has: Mapping[str, Sequence[str]])
 
 def refusal(identities: Mapping[str, Sequence[str]], icao: str, description: str) -> str:
     """Why the loaded aircraft is none of those wanted; empty when it is one, or when any will do."""
-    shown = {icao, description} - {""}
-    if not identities or any(not codes or shown & set(codes) for codes in identities.values()):
+    # Blanks at the ends do not count, as for tx_node.
+    shown = {icao.strip(" "), description.strip(" ")} - {""}
+    if not identities or any(not codes or shown & {code.strip(" ") for code in codes} for codes in identities.values()):
         return ""
     wanted = " or ".join(f"{name} ({', '.join(codes)})" for name, codes in identities.items())
     loaded = f"{icao or 'one without ICAO code'} ({description})"

@@ -66,6 +66,20 @@ TEST(AircraftIdentity, ReadsBothStringsAndSaysWhenTheyChange) {
   EXPECT_EQ(reader.answers(), 3u);
 }
 
+TEST(AircraftIdentity, IsListedByEitherNameWhateverBlanksAreAtTheEnds) {
+  AircraftIdentityReader reader;
+  Feeder feeder;
+  feeder.set("sim/aircraft/view/acf_descrip", " My Glider ");
+  ASSERT_TRUE(feeder.feed(&reader));
+  EXPECT_EQ(reader.identity().description, " My Glider") << "as aircraft_config writes it";
+  EXPECT_TRUE(isListed(reader.identity(), {"BE58", " My Glider"}));
+  EXPECT_TRUE(isListed(reader.identity(), {"My Glider"}));
+  EXPECT_FALSE(isListed(reader.identity(), {"MyGlider", "My  Glider", "", " "})) << "nor by the ICAO code it has not";
+  EXPECT_TRUE(isListed({"BE58", "Baron"}, {"BE58"}));
+  EXPECT_TRUE(isListed({"BE58", "Baron"}, {" Baron"}));
+  EXPECT_FALSE(isListed({"BE58", "Baron"}, {"BE5"}));
+}
+
 TEST(AircraftIdentity, WaitsForACharacterWhoseRequestWasLost) {
   for (const char* lost : {"sim/aircraft/view/acf_ICAO[2]", "sim/aircraft/view/acf_descrip[0]"}) {
     AircraftIdentityReader reader;
