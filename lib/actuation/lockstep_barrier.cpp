@@ -126,11 +126,6 @@ void LockstepBarrier::run() {
   granted_ = kEndless;
 }
 
-bool LockstepBarrier::isEndless() const {
-  const BarrierLock lock(mutex_);
-  return granted_ == kEndless;
-}
-
 std::uint32_t LockstepBarrier::number() const {
   const BarrierLock lock(mutex_);
   return number_;

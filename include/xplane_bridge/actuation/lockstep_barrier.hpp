@@ -42,8 +42,6 @@ class LockstepBarrier {
   void step(std::uint64_t frames);
   /// Flies on without end.
   void run();
-  /// Whether it flies on without end, by run() or from its beginning.
-  bool isEndless() const;
   /// Whether the present frame is answered, and held.
   bool holds() const;
   /// Whether the present frame is answered: complete() or holds().

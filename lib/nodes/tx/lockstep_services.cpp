@@ -1,5 +1,6 @@
 #include "xplane_bridge/nodes/tx/lockstep_services.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <mutex>
 #include <utility>
@@ -13,6 +14,7 @@ using Turn = std::lock_guard<core::TurnMutex>;
 
 constexpr double kFrameWait = 5.0;  // [s] without a frame in which X-Plane counts as standing
 constexpr const char* kNodeEnds = "tx_node ends";
+constexpr const char* kReplaced = "another lockstep/step or lockstep/run has taken its place";
 
 }  // namespace
 
@@ -26,7 +28,11 @@ void LockstepServices::step(const LockstepStep::Request& request, LockstepStep::
 
 std::string LockstepServices::setRunning(bool running) {
   if (lockstep_ != nullptr) {
-    running ? lockstep_->run() : lockstep_->step(0);
+    if (running) {
+      lockstep_->run();
+    } else {
+      lockstep_->step(0);
+    }
     return "";
   }
   const Turn turn(turn_);
@@ -42,15 +48,14 @@ std::uint64_t LockstepServices::note(bool holds) {
 
 void LockstepServices::stepInLockstep(const LockstepStep::Request& request, LockstepStep::Response* response) {
   const std::uint32_t before = lockstep_->frame();
-  lockstep_->step(request.frames);
-  const TxLockstep::Held held = lockstep_->waitUntilHeld();
+  const TxLockstep::Held held = lockstep_->waitUntilHeld(lockstep_->step(request.frames));
   response->success = held == TxLockstep::Held::kHeld;
-  response->flown = lockstep_->frame() - before;
+  response->flown = std::min(lockstep_->frame() - before, request.frames);  // the next call's follow at once
   response->sim_time = actuation_.simTime();
   if (response->success) {
     response->result = result(ServiceResult::OK, "flown and held");
-  } else if (held == TxLockstep::Held::kRuns) {
-    response->result = result(ServiceResult::REFUSED, "lockstep/run was called meanwhile: the flight goes on");
+  } else if (held == TxLockstep::Held::kReplaced) {
+    response->result = result(ServiceResult::REFUSED, kReplaced);
   } else {
     response->result = result(ServiceResult::NO_LINK, kNodeEnds);
   }
@@ -83,7 +88,7 @@ void LockstepServices::stepFreely(const LockstepStep::Request& request, Lockstep
     const Turn turn(turn_);
     if (calls_ != call && !last_holds_) {
       code = ServiceResult::REFUSED;
-      why_not = "another lockstep/step or lockstep/run has taken its place";
+      why_not = kReplaced;
     } else if (ending_()) {
       why_not = kNodeEnds;  // who asked for the pause is not there to end it
     } else {

@@ -102,7 +102,7 @@ void TxLockstep::open(const core::LockstepFrame& frame, const ros::Time& stamp) 
 
 bool TxLockstep::ready() {
   const bool complete = barrier_.complete();
-  bool opened = false;
+  bool opened = false, holds = false;
   {
     const Lock lock(mutex_);
     // Frame 0 is never closed: once it is answered, what is asked for is of the first frame.
@@ -110,9 +110,11 @@ bool TxLockstep::ready() {
     opened = handled && !handled_;
     handled_ = handled;
     node_ready_ = true;
+    holds = barrier_.holds();
+    if (holds) held_flight_ = flights_;
   }
   if (opened) opened_.notifyAll();
-  if (barrier_.holds()) held_.notifyAll();
+  if (holds) held_.notifyAll();
   return complete;
 }
 
@@ -151,14 +153,26 @@ void TxLockstep::close() {
   progress();
 }
 
-void TxLockstep::step(std::uint32_t frames) {
-  barrier_.step(frames);
+std::uint64_t TxLockstep::step(std::uint32_t frames) {
+  std::uint64_t call = 0;
+  {
+    const Lock lock(mutex_);
+    if (frames > 0) ++flights_;
+    call = flights_;
+    barrier_.step(frames);
+  }
   progress();
+  held_.notifyAll();
   wake_();
+  return call;
 }
 
 void TxLockstep::run() {
-  barrier_.run();
+  {
+    const Lock lock(mutex_);
+    ++flights_;
+    barrier_.run();
+  }
   progress();
   held_.notifyAll();
   wake_();
@@ -169,11 +183,11 @@ void TxLockstep::waitUntilOpen() {
   opened_.wait(&lock, [this] { return stopped_ || handled_; });
 }
 
-TxLockstep::Held TxLockstep::waitUntilHeld() {
+TxLockstep::Held TxLockstep::waitUntilHeld(std::uint64_t call) {
   std::unique_lock<std::mutex> lock(mutex_);
-  held_.wait(&lock, [this] { return stopped_ || barrier_.holds() || barrier_.isEndless(); });
+  held_.wait(&lock, [this, call] { return stopped_ || flights_ != call || barrier_.holds(); });
   if (stopped_) return Held::kStopped;
-  return barrier_.holds() ? Held::kHeld : Held::kRuns;
+  return flights_ == call || held_flight_ >= call ? Held::kHeld : Held::kReplaced;
 }
 
 void TxLockstep::progress() {

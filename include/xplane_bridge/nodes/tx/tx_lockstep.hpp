@@ -58,14 +58,17 @@ class TxLockstep {
 
   // Services.
 
-  void step(std::uint32_t frames);
+  /// Takes the place of a step that waits; 0 frames hold it where it is.
+  /// @return the call, for waitUntilHeld()
+  std::uint64_t step(std::uint32_t frames);
+  /// Takes the place of a step that waits.
   void run();
   /// Waits until a frame is open and was handled, or stop(): a participant may have seen a frame before tx_node has,
   /// and what it asks for belongs to that frame.
   void waitUntilOpen();
-  enum class Held : std::uint8_t { kHeld, kRuns, kStopped };
-  /// Waits until the present frame is answered and held, or run(), or stop().
-  Held waitUntilHeld();
+  enum class Held : std::uint8_t { kHeld, kReplaced, kStopped };
+  /// Waits until the present frame is answered and held, or another call lets it fly, or stop().
+  Held waitUntilHeld(std::uint64_t call);
   std::uint32_t frame() const { return barrier_.number(); }
 
   /// Ends the watchdog and all waiting.
@@ -111,6 +114,8 @@ class TxLockstep {
   bool handled_ = false;      // the present frame, and it is not closed; of frame 0, until it is answered
   bool node_ready_ = false;   // ready() was called in the present frame
   std::int64_t progress_ns_ = 0;
+  std::uint64_t flights_ = 1;      // the one that the last call let it fly
+  std::uint64_t held_flight_ = 0;  // the last one that was held
   bool stopped_ = false;
   std::thread watchdog_;  // last: it uses all of the above
 };

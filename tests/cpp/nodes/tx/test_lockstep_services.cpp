@@ -267,7 +267,19 @@ TEST_F(LockstepStepTest, RunEndsAStepThatWaits) {
   const LockstepStep::Response response = stepUntil([this] { EXPECT_EQ(services_.setRunning(true), ""); });
   EXPECT_FALSE(response.success);
   EXPECT_EQ(response.result.code, ServiceResult::REFUSED);
-  EXPECT_EQ(response.result.message, "lockstep/run was called meanwhile: the flight goes on");
+  EXPECT_EQ(response.result.message, "another lockstep/step or lockstep/run has taken its place");
+}
+
+TEST_F(LockstepStepTest, AnotherStepTakesThePlaceOfOneThatWaits) {
+  LockstepStep::Response another;
+  const LockstepStep::Response response = stepUntil([&] { another = step(5); });
+  EXPECT_FALSE(response.success);
+  EXPECT_EQ(response.result.code, ServiceResult::REFUSED);
+  EXPECT_EQ(response.result.message, "another lockstep/step or lockstep/run has taken its place");
+  EXPECT_GE(response.flown, 2U);
+  EXPECT_LE(response.flown, lockstep_.frame());
+  EXPECT_TRUE(another.success) << another.result.message;
+  EXPECT_EQ(another.result.code, ServiceResult::OK);
 }
 
 TEST_F(LockstepStepTest, HoldEndsAStepThatWaits) {

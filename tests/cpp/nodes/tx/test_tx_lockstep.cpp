@@ -65,6 +65,24 @@ TEST_F(TxLockstepTest, ARequestIsCarriedOutInTheSecondFrameAfterItsOwnWheneverIt
   EXPECT_EQ(fly(5), Texts{});
 }
 
+TEST_F(TxLockstepTest, AStepThatWasFlownIsHeldAlsoWhereTheNextOneBeginsBeforeItsCallerLooks) {
+  fly(1);
+  const auto answer = [this](std::uint32_t frame) {
+    for (const char* who : {"/rx_node", "/player"}) lockstep_.takeDone(who, stamp(frame), "");
+    return lockstep_.ready();
+  };
+  const std::uint64_t first = lockstep_.step(1);
+  open(2);
+  EXPECT_TRUE(answer(2));
+  close();
+  open(3);
+  EXPECT_FALSE(answer(3)) << "it is held";
+  const std::uint64_t second = lockstep_.step(5);
+  lockstep_.step(2);
+  EXPECT_EQ(lockstep_.waitUntilHeld(first), TxLockstep::Held::kHeld);
+  EXPECT_EQ(lockstep_.waitUntilHeld(second), TxLockstep::Held::kReplaced);
+}
+
 TEST_F(TxLockstepTest, RequestsThatAreDueTogetherHaveAnOrderOfTheirOwn) {
   fly(1);
   open(2);
