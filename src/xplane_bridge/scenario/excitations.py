@@ -7,8 +7,9 @@ formulas.
 from __future__ import annotations
 
 import math
+import re
 from functools import lru_cache
-from typing import Any, Mapping, Tuple
+from typing import Any, Mapping, Sequence, Tuple
 
 import numpy as np
 
@@ -18,6 +19,11 @@ from xplane_bridge.scenario.schema import ScenarioError
 FADE_S = 0.5
 _MOST_SINES = 2000
 _AXES = ("roll", "pitch", "yaw", "throttle")
+#: Names of docs/control/surfaces.md.
+_SURFACE = re.compile(
+    r"((aileron|spoiler|flap|speedbrake|elevator)[12]|yaw_brake)_wing[1-4]_(left|right)|elevator[12]_(left|right)|"
+    r"rudder[12]_fin[12]"
+)
 #: Samples of the highest sine's period by which the multisine's peak is found.
 _PEAK_SAMPLES = 32
 
@@ -35,9 +41,9 @@ def check(parameters: Mapping[str, Any], path: str = "excitation") -> None:
     """
     kind, duration = parameters["kind"], parameters["duration"]
     amplitude = parameters["amplitude"]
-    on_axes = all(target.strip() in _AXES for target in parameters["target"].split(","))
-    if not amplitude > 0.0 or (on_axes and amplitude > 1.0):
-        expected = "a number above 0, up to 1, which is full travel" if on_axes else "a number above 0"
+    axes = _axes(parameters["target"], f"{path}.target")
+    if not amplitude > 0.0 or (axes and amplitude > 1.0):
+        expected = "a number above 0, up to 1, which is full travel" if axes else "a number above 0"
         raise ScenarioError(f"{path}.amplitude: {amplitude:g}; expected {expected}")
     if kind in ("doublet", "3-2-1-1"):
         return
@@ -51,12 +57,27 @@ def check(parameters: Mapping[str, Any], path: str = "excitation") -> None:
         )
     if kind == "multisine":
         first, last = _harmonics(low, high, duration)
-        targets = len(parameters["target"].split(","))
+        targets = max(1, len(axes))
         if not targets <= last - first + 1 <= _MOST_SINES * targets:
             raise ScenarioError(
                 f"{path}.frequency_end: {high:g}; expected {targets} to {_MOST_SINES * targets} multiples of "
                 f"1/duration between it and frequency ({low:g})"
             )
+
+
+def _axes(target: str, path: str) -> Sequence[str]:
+    """The axes that are moved; none where it is a surface."""
+    if _SURFACE.fullmatch(target):
+        return ()
+    axes = target.replace(" ", "").split(",")
+    if not all(axis in _AXES for axis in axes):
+        raise ScenarioError(
+            f"{path}: {target!r}; expected {', '.join(_AXES)} or one surface (docs/control/surfaces.md), of a "
+            'multisine also several axes, for example "roll,pitch"'
+        )
+    if len(set(axes)) < len(axes):
+        raise ScenarioError(f"{path}: {target!r}; expected each axis once")
+    return axes
 
 
 def value(parameters: Mapping[str, Any], time_s: float) -> float:

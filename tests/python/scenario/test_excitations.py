@@ -9,6 +9,7 @@ import pytest
 
 from xplane_bridge.compiled import core
 from xplane_bridge.constants import EXCITATION_KINDS
+from xplane_bridge.in_process.failures import SURFACES
 from xplane_bridge.scenario import ScenarioError, excitations, parse_scenario
 
 GIVEN = {
@@ -61,19 +62,29 @@ def test_another_seed_is_another_multisine() -> None:
     ("changes", "text"),
     [
         ({"amplitude": 1.5}, r"amplitude: 1\.5; expected a number above 0, up to 1"),
-        ({"amplitude": 0.0, "target": "left_aileron"}, r"amplitude: 0; expected a number above 0$"),
+        ({"amplitude": 0.0, "target": "aileron1_wing2_left"}, r"amplitude: 0; expected a number above 0$"),
         ({"kind": "chirp", "frequency": 2.5}, r"frequency_end: 2; expected a number not below frequency \(2\.5\)"),
         ({"kind": "chirp", "duration": 0.9}, r"duration: 0\.9; expected 1 s or more: a chirp fades in and out"),
         ({"frequency": 1.99, "duration": 1.3}, r"frequency_end: 2; expected 1 to 2000 multiples of 1/duration"),
         ({"target": "roll,pitch", "frequency": 1.99}, r"frequency_end: 2; expected 2 to 4000 multiples of 1/dur"),
         ({"frequency_end": 10.0, "duration": 600.0}, r"frequency_end: 10; expected 1 to 2000 multiples"),
         ({"kind": "square"}, r"kind: 'square'; expected"),
+        ({"target": "rol"}, r"target: 'rol'; expected roll, pitch, yaw, throttle or one surface"),
+        ({"target": "roll,"}, r"target: 'roll,'; expected roll, pitch, yaw, throttle or one surface"),
+        ({"target": "aileron1_wing1_left,roll"}, r"target: 'aileron1_wing1_left,roll'; expected .* or one surface"),
+        ({"target": "aileron1_wing5_left"}, r"target: 'aileron1_wing5_left'; expected .* or one surface"),
+        ({"target": "yaw, roll, yaw"}, r"target: 'yaw, roll, yaw'; expected each axis once"),
     ],
 )
 def test_what_tx_node_would_refuse_in_flight_is_refused_at_the_start(changes: dict[str, Any], text: str) -> None:
     excitation = {**GIVEN, **changes}
     with pytest.raises(ScenarioError, match=r"events\[0\]\.excitation\." + text):
         parse_scenario({"name": "test", "events": [{"at": 0.0, "excitation": excitation}]})
+
+
+def test_what_tx_node_takes_as_a_target_is_taken() -> None:
+    for target in ("roll, yaw", "throttle,pitch", *SURFACES):
+        parse_scenario({"name": "test", "events": [{"at": 0.0, "excitation": {**GIVEN, "target": target}}]})
 
 
 def test_an_unknown_kind_is_not_played_as_a_multisine() -> None:
