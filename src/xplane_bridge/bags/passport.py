@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Iterator, Mapping
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any, Iterator, Mapping, Optional, Sequence
 
 from xplane_bridge.bags import BagError
 
@@ -12,6 +13,9 @@ if TYPE_CHECKING:
     from xplane_bridge.bags import Bags
 
 MESSAGE = "xplane_bridge/Experiment"
+#: Characters of a text on a line of a table.
+LONGEST = 160
+_BEFORE = 40  # of them before the first one that differs
 
 
 @dataclass(frozen=True)
@@ -44,10 +48,10 @@ class Passport:
         return self.lines() == other.lines() and self.parameters == other.parameters
 
     def lines(self) -> dict[str, str]:
-        """Give all that it says, each with its name: parameters as paths, the texts of whole files left out."""
+        """Give all that it says, each with its name: parameters as paths; the texts of files have several lines."""
         out = {name: _words(value) for name, value in self.others.items()}
         out.update({name: _words(value) for name, value in self.settings.items()})
-        out.update({path: _words(value) for path, value in _leaves(self.parameters) if "\n" not in str(value)})
+        out.update({path: _words(value) for path, value in _leaves(self.parameters)})
         return out
 
 
@@ -69,6 +73,34 @@ def read_passports(bags: Bags) -> list[Passport]:
         if not found or not passport.says_the_same(found[-1]):  # split recordings repeat it
             found.append(passport)
     return found
+
+
+def shortened(texts: Sequence[Optional[str]]) -> list[Optional[str]]:
+    """Cut texts down to a line each, which shows where they first differ; None stays None.
+
+    What is left out of a text has a short SHA-256 for it: of more than two, some may differ elsewhere only.
+    """
+    lines = [[] if text is None else text.split("\n") for text in texts]
+    places = range(max(map(len, lines), default=0))
+    number = next((k for k in places if len({each[k] if k < len(each) else None for each in lines if each}) > 1), 0)
+    there = [each[number] for each in lines if number < len(each)]
+    start = 0
+    if any(len(line) > LONGEST for line in there):
+        alike = next((k for k, each in enumerate(zip(*there)) if len(set(each)) > 1), min(map(len, there)))
+        start = max(0, alike - _BEFORE)
+
+    def short(text: str, own: Sequence[str]) -> str:
+        if len(own) == 1 and len(text) <= LONGEST:
+            return text
+        code = f"(SHA-256 {sha256(text.encode()).hexdigest()[:8]})"
+        if number >= len(own):
+            return f"ends before line {number + 1} {code}"
+        line = own[number]
+        shown = ("\u2026 " if start else "") + line[start : start + LONGEST]
+        shown += " \u2026" if start + LONGEST < len(line) else ""
+        return f"line {number + 1}: {shown} {code}" if len(own) > 1 else f"{shown} {code}"
+
+    return [None if text is None else short(text, own) for text, own in zip(texts, lines)]
 
 
 def _passport(message: Any, topic: str) -> Passport:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 from typing import TYPE_CHECKING, Optional, Sequence
 
+from xplane_bridge.bags.passport import LONGEST, shortened
 from xplane_bridge.plotting.page import missing, rows_table
 
 if TYPE_CHECKING:
@@ -45,7 +46,9 @@ def differences_table(names: Sequence[str], passports: Sequence[Optional[Passpor
     for key in keys:
         values = [each.get(key) for each in lines]
         if len(set(values)) > 1:
-            cells = ['<span class="missing">none</span>' if value is None else _cell(value) for value in values]
+            cells = [
+                '<span class="missing">none</span>' if text is None else html.escape(text) for text in shortened(values)
+            ]
             rows.append((html.escape(key), *cells))
     if not rows:
         return '<p class="good">Nothing: all were made alike.</p>'
@@ -53,5 +56,5 @@ def differences_table(names: Sequence[str], passports: Sequence[Optional[Passpor
 
 
 def _cell(text: str) -> str:
-    longest = 160
-    return html.escape(text if len(text) <= longest else text[:longest] + " \u2026")
+    shown = text if len(text) <= LONGEST else text[:LONGEST] + " \u2026"
+    return html.escape(shown).replace("\n", "<br>")
