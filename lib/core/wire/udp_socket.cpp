@@ -119,18 +119,22 @@ std::uint32_t localAddressTowards(const Endpoint& peer) {
   return toEndpoint(local).address;
 }
 
-bool isOwnAddress(std::uint32_t address) {
+std::vector<std::uint32_t> ownAddresses() {
+  std::vector<std::uint32_t> out;
   const InterfaceList interfaces = listInterfaces();
   for (const ifaddrs* each = interfaces.get(); each != nullptr; each = each->ifa_next) {
     if (each->ifa_addr != nullptr && each->ifa_addr->sa_family == AF_INET) {
       sockaddr_in own{};
       std::memcpy(&own, each->ifa_addr, sizeof(own));
-      if (isSameHost(toEndpoint(own).address, address)) {
-        return true;
-      }
+      out.push_back(toEndpoint(own).address);
     }
   }
-  return false;
+  return out;
+}
+
+bool isOwnAddress(std::uint32_t address) {
+  const std::vector<std::uint32_t> own = ownAddresses();
+  return std::any_of(own.begin(), own.end(), [address](std::uint32_t each) { return isSameHost(each, address); });
 }
 
 UdpSocket::UdpSocket(const UdpSocketOptions& options) {

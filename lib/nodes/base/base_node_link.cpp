@@ -48,8 +48,9 @@ void BaseNode::makeLink() {
   }
   core::SimLinkOptions options = linkOptions(common_);
   if (!lockstep()) options.jitter_seed = wire_ ? kLoggedJitterSeed : static_cast<std::uint32_t>(getpid());
-  options.otherwise = [file = common_.conformance_file](const core::Endpoint& peer, std::int32_t version) {
-    return readConformance(file, peer, version);
+  options.otherwise = [file = common_.conformance_file, replays = replays()](const core::Endpoint& peer,
+                                                                             std::int32_t version) {
+    return readConformance(file, peer, version, replays);
   };
   configureLink(&options);
   std::unique_ptr<core::DatagramHub> hub = std::move(hub_of_link_);

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <set>
+#include <map>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -15,6 +15,7 @@
 #include "xplane_bridge/core/wire/udp_hub.hpp"
 #include "xplane_bridge/core/wire/wire_log_hub.hpp"
 #include "xplane_bridge/nodes/base/base_node.hpp"
+#include "xplane_bridge/nodes/base/conformance_file.hpp"
 #include "xplane_bridge/nodes/base/log_to_ros.hpp"
 #include "xplane_bridge/nodes/base/parameter_text.hpp"
 #include "xplane_bridge/nodes/base/user_folder.hpp"
@@ -102,14 +103,17 @@ void BaseNode::logUserFiles() {
   namespace fs = std::filesystem;
   const fs::path folder = userFolder();
   std::error_code none;
-  std::set<fs::path> files;
+  std::map<std::string, fs::path> files;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder, none)) {
-    if (entry.is_regular_file(none) && entry.path().extension() == ".yaml") files.insert(entry.path());
+    if (entry.is_regular_file(none) && entry.path().extension() == ".yaml") {
+      files[entry.path().lexically_relative(folder).string()] = entry.path();
+    }
   }
-  for (const fs::path& file : files) {
+  nameByEachAddress(&files);
+  for (const auto& [name, file] : files) {
     std::ifstream in(file, std::ios::binary);
     const NodeWire::Bytes bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-    wire_->post(kUserFile + file.lexically_relative(folder).string(), bytes, [] {});
+    wire_->post(kUserFile + name, bytes, [] {});
   }
 }
 

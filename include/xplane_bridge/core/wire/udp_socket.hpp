@@ -18,7 +18,10 @@ bool isSameHost(std::uint32_t a, std::uint32_t b);
 /// Throws SocketError with the name and the resolver's reason.
 std::uint32_t resolveHost(const std::string& host);
 
-/// Whether an address is one of this computer's interfaces, loopback included.
+/// The IPv4 addresses of this computer's interfaces, loopback included. Throws SocketError when they cannot be listed.
+std::vector<std::uint32_t> ownAddresses();
+
+/// Whether an address is one of ownAddresses().
 bool isOwnAddress(std::uint32_t address);
 
 /// The local address from which datagrams to `peer` leave. Throws SocketError when there is no route.

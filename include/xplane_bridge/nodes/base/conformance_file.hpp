@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
+#include <map>
 #include <string>
 
 #include "xplane_bridge/core/wire/datagram_source.hpp"
@@ -11,6 +13,12 @@ namespace xplane_bridge {
 /// refuted and what is done about it. A file that is for another version of X-Plane, or cannot be read, is ignored with
 /// a warning.
 /// @param file parameter conformance_file; empty: the one that the doctor writes into userFolder()
-std::uint32_t readConformance(const std::string& file, const core::Endpoint& peer, std::int32_t version);
+/// @param replays whether the addresses are those of another time, and maybe of another computer
+std::uint32_t readConformance(const std::string& file, const core::Endpoint& peer, std::int32_t version, bool replays);
+
+/// Adds the file of this computer's X-Plane under each of the computer's addresses, for a log: a replay does not know
+/// which addresses the computer had.
+/// @param files of userFolder(), by their names in it
+void nameByEachAddress(std::map<std::string, std::filesystem::path>* files);
 
 }  // namespace xplane_bridge
