@@ -22,6 +22,9 @@ constexpr std::uint32_t kInbound = 1;
 constexpr std::uint32_t kOutbound = 2;
 constexpr std::size_t kLongestOption = 0xFFFC;
 
+/// Of UTF-8.
+bool continuesCharacter(char byte) { return (static_cast<unsigned char>(byte) & 0xC0U) == 0x80U; }
+
 /// One block, from its construction to its destruction.
 class Block {
  public:
@@ -57,6 +60,14 @@ class Block {
   void option(std::uint16_t code, const std::string& text) {
     if (!text.empty()) option(code, ByteView(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
   }
+  /// A text of any length: as many comments as it needs, whole characters in each.
+  void comments(const std::string& text) {
+    for (std::size_t begin = 0, end = 0; begin < text.size(); begin = end) {
+      end = std::min(text.size(), begin + kLongestOption);
+      while (end < text.size() && end > begin + 1 && continuesCharacter(text[end])) --end;
+      option(kComment, text.substr(begin, end - begin));
+    }
+  }
   void endOptions() { put(std::uint32_t{0}); }
 
  private:
@@ -78,7 +89,7 @@ void appendSection(const std::string& application, const std::string& comment, s
   block.put(std::uint16_t{0});
   block.put(std::int64_t{-1});  // length: not said
   block.option(kUserApplication, application);
-  block.option(kComment, comment);
+  block.comments(comment);
   block.endOptions();
 }
 

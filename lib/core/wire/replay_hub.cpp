@@ -83,7 +83,14 @@ std::shared_ptr<DatagramSource> ReplayHub::open(const std::string& name, const U
   const std::lock_guard<std::mutex> lock(mutex_);
   auto found = std::find_if(opened_.begin(), opened_.end(),
                             [&name](const Opened& each) { return !each.claimed && each.name == name; });
-  if (found == opened_.end()) found = opened_.insert(opened_.end(), {name, options.bind_port, false, false});
+  if (found == opened_.end()) {
+    // One more than recorded, as a new list of datarefs where the log's first part is gone: it hears what the newest
+    // does.
+    const auto newest =
+        std::find_if(opened_.rbegin(), opened_.rend(), [&name](const Opened& each) { return each.name == name; });
+    found = newest != opened_.rend() ? std::prev(newest.base())
+                                     : opened_.insert(opened_.end(), {name, options.bind_port, false, false});
+  }
   found->claimed = true;
   return std::make_shared<Source>(this, static_cast<std::uint16_t>(found - opened_.begin()), found->port);
 }
@@ -98,9 +105,18 @@ bool ReplayHub::hasInput(const DatagramSource& source) const {
   return opened_[static_cast<const Source&>(source).number].ready;
 }
 
+/// readRecord(), without datagrams for sources that the node has not opened: they would hold up all behind them.
+bool ReplayHub::read(std::size_t* offset, WireRecord* record) const {
+  while (readRecord(bytes_, offset, record)) {
+    const bool taken = record->source < opened_.size() && opened_[record->source].claimed;
+    if (record->kind != WireKind::kReceived || taken) return true;
+  }
+  return false;
+}
+
 bool ReplayHub::peek(WireRecord* record, std::size_t* after) const {
   *after = next_;
-  return readRecord(bytes_, after, record) && record->kind != WireKind::kLost;
+  return read(after, record) && record->kind != WireKind::kLost;
 }
 
 /// Goes to the next record of a kind; what lies before it does not come about any more. False: there is none before the
@@ -117,8 +133,8 @@ bool ReplayHub::skipTo(WireKind wanted, WireRecord* record) {
 void ReplayHub::findReady() {
   for (Opened& each : opened_) each.ready = false;
   WireRecord record;
-  for (std::size_t offset = next_; readRecord(bytes_, &offset, &record) && record.kind != WireKind::kWaited;) {
-    if (record.kind == WireKind::kReceived && record.source < opened_.size()) opened_[record.source].ready = true;
+  for (std::size_t offset = next_; read(&offset, &record) && record.kind != WireKind::kWaited;) {
+    if (record.kind == WireKind::kReceived) opened_[record.source].ready = true;
   }
 }
 
@@ -126,7 +142,7 @@ void ReplayHub::findReady() {
 bool ReplayHub::nextInput(std::vector<std::uint8_t>* input) {
   const std::lock_guard<std::mutex> lock(mutex_);
   WireRecord record;
-  for (std::size_t offset = next_; readRecord(bytes_, &offset, &record);) {
+  for (std::size_t offset = next_; read(&offset, &record);) {
     if (record.kind == WireKind::kInput) {
       skipTo(WireKind::kInput, &record);
       next_ = offset;
@@ -163,7 +179,7 @@ void ReplayHub::goOn(int timeout_ms) {
   if (!progress_->ended.exchange(true)) {
     for (Opened& each : opened_) each.ready = false;
     WireRecord record;
-    if (std::size_t after = next_; readRecord(bytes_, &after, &record) && record.kind == WireKind::kLost) {
+    if (std::size_t after = next_; read(&after, &record) && record.kind == WireKind::kLost) {
       log_(LogLevel::kWarn, "the recording has a gap of " + std::to_string(record.count) +
                                 " records, which were not written in time: the replay ends there");
     }
@@ -179,7 +195,7 @@ bool ReplayHub::takeReceived(std::uint16_t number, ByteSpan buffer, Received* re
   WireRecord record;
   std::uint64_t passed = 0;
   std::size_t offset = next_;
-  while (readRecord(bytes_, &offset, &record) && (record.kind == WireKind::kOpened || record.kind == WireKind::kSent)) {
+  while (read(&offset, &record) && (record.kind == WireKind::kOpened || record.kind == WireKind::kSent)) {
     passed += record.kind == WireKind::kSent ? 1U : 0U;
   }
   // What is to be sent first may still be sent, where the next datagram is another source's.
@@ -201,7 +217,7 @@ bool ReplayHub::takeSent(std::uint16_t number, ByteView bytes, const Endpoint& t
   ++progress_->sent;
   WireRecord record;
   std::uint64_t passed = 0;
-  for (std::size_t offset = next_; readRecord(bytes_, &offset, &record);) {
+  for (std::size_t offset = next_; read(&offset, &record);) {
     if (record.kind == WireKind::kSent) {
       if (record.source == number && record.peer == to && sameBytes(record.payload, bytes)) {
         next_ = offset;

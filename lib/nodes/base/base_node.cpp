@@ -220,7 +220,6 @@ void BaseNode::stop() {
     step("undo in X-Plane", [&] { undo(deadline); });
     step("stop the link", [&] { stopLink(deadline); });
     step("publish the final state", [this] {
-      reportReplay();
       publishFinalState();
       flushPublishers();
     });

@@ -25,8 +25,9 @@ namespace {
 
 constexpr std::chrono::milliseconds kAsk{50};
 // By these private parameters scripts/wire_replay and the node wait for each other.
+constexpr const char* kReplayWaits = "wire_replay_waits";          // the node has advertised everything
 constexpr const char* kReplayStart = "wire_replay_start";          // its recorder is connected
-constexpr const char* kReplayPublished = "wire_replay_published";  // the node has published everything
+constexpr const char* kReplayPublished = "wire_replay_published";  // the node's report: all is published
 constexpr const char* kReplayReceived = "wire_replay_received";    // and the recorder has all of it
 constexpr double kLongestDelivery = 120.0;                         // [s]
 constexpr std::uint64_t kBytesOfMegabyte = 1'000'000;
@@ -38,7 +39,7 @@ const std::string kUserFile = "file ";              // scripts/wire_replay puts 
 void BaseNode::openWire(const ParamLoader& own) {
   if (!usesLink()) return;
   const std::string replay = own.text("wire_replay", "");
-  for (const char* key : {kReplayStart, kReplayPublished, kReplayReceived}) own.allow(key);
+  for (const char* key : {kReplayWaits, kReplayStart, kReplayPublished, kReplayReceived}) own.allow(key);
   const bool ordered = wireIsOrdered() && !lockstep();
   if (!replay.empty() && !ordered) {
     own.refuse("wire_replay", "empty: this node, and any in lock-step, can log its wire but not play it back");
@@ -89,6 +90,7 @@ void BaseNode::startWire() {
     logUserFiles();
   } else {
     ROS_INFO("waiting for scripts/wire_replay to record");
+    private_handle_.setParam(kReplayWaits, true);
     bool go = false;
     while (!go && !stopping()) {
       private_handle_.getParam(kReplayStart, go);
@@ -120,19 +122,16 @@ void BaseNode::logUserFiles() {
 bool BaseNode::replays() const { return wire_ && wire_->replays(); }
 
 void BaseNode::waitForReplayDelivery() {
-  private_handle_.setParam(kReplayPublished, true);
+  const std::string report = "replayed " + std::to_string(replayed_->datagrams) + " datagrams; " +
+                             std::to_string(replayed_->sent) + " were sent, " +
+                             std::to_string(replayed_->sent_otherwise) + " otherwise than recorded";
+  ROS_INFO("%s", report.c_str());
+  private_handle_.setParam(kReplayPublished, report);
   const Deadline deadline(host_clock_, kLongestDelivery);
   for (bool received = false; !received && !deadline.over() && ros::master::check();) {
     private_handle_.getParam(kReplayReceived, received);
     if (!received) std::this_thread::sleep_for(kAsk);
   }
-}
-
-void BaseNode::reportReplay() const {
-  if (!replays()) return;
-  ROS_INFO("replayed %llu datagrams; %llu were sent, %llu otherwise than recorded",
-           static_cast<unsigned long long>(replayed_->datagrams), static_cast<unsigned long long>(replayed_->sent),
-           static_cast<unsigned long long>(replayed_->sent_otherwise));
 }
 
 }  // namespace xplane_bridge

@@ -162,6 +162,16 @@ void RxNode::advertise() {
   }
   datarefs_->advertise(topics());
   if (traffic_) traffic_->advertise(topics());
+  if (traffic_ && wired()) {
+    // Logged, so that a replay asks X-Plane when the node did, with or without subscribers there.
+    for (const bool wanted : {true, false}) {
+      const auto turns = [this, wanted] { return traffic_->demanded() == wanted && traffic_->wanted() != wanted; };
+      pollInput(wanted ? "traffic wanted" : "traffic not wanted", turns, [this, wanted] {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        wantTraffic(wanted);
+      });
+    }
+  }
   if (common().transport == core::Transport::kData) {
     rows_publisher_ = advertiseTopic<DataRows>("data_rows", kRowsQueueSize);
   }
@@ -343,7 +353,10 @@ void RxNode::supervise() {
   const core::LinkStatus status = link().status();
   adoptVersion(status);
   if (adopted_version_) {
-    superviseTraffic();
+    if (traffic_ && !wired()) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      wantTraffic(traffic_->demanded());
+    }
     renewSubscriptions();
     supervisePositionCheck();
   }
@@ -421,11 +434,9 @@ void RxNode::renewSubscriptions() {
   }
 }
 
-/// What the topic's subscribers want changes without a word of X-Plane.
-void RxNode::superviseTraffic() {
-  if (!traffic_) return;
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (traffic_->wantedChanges()) streams_[traffic_stream_].current = false;
+/// With mutex_ locked.
+void RxNode::wantTraffic(bool wanted) {
+  if (traffic_->want(wanted)) streams_[traffic_stream_].current = false;
 }
 
 void RxNode::supervisePositionCheck() {

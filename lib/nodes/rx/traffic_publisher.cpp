@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "xplane_bridge/core/base/units.hpp"
 #include "xplane_bridge/nodes/base/ros_time.hpp"
@@ -31,12 +32,14 @@ std::vector<std::string> TrafficPublisher::requests() const {
   return wanted_ ? traffic_.requests() : std::vector<std::string>();
 }
 
-bool TrafficPublisher::wantedChanges() {
-  const bool before = wanted_;
+bool TrafficPublisher::demanded() const {
   // In lock-step who wants it may come until the flight begins; from then on every run asks in the same frame.
-  wanted_ = !muted_ && publisher_.getNumSubscribers() > 0;
-  if (wanted_ && !before) traffic_.reset();
-  return wanted_ != before;
+  return !muted_ && publisher_.getNumSubscribers() > 0;
+}
+
+bool TrafficPublisher::want(bool wanted) {
+  if (wanted && !wanted_) traffic_.reset();
+  return std::exchange(wanted_, wanted) != wanted;
 }
 
 void TrafficPublisher::onRref(const core::RrefView& datagram, std::int64_t receive_ns, const core::ClockFilter& clock) {

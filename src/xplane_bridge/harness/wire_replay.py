@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 import struct
 import threading
@@ -15,7 +14,8 @@ from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_u
 from xplane_bridge.harness.ros import RosMaster
 from xplane_bridge.resources import node_program
 
-_START, _PUBLISHED, _RECEIVED = "wire_replay_start", "wire_replay_published", "wire_replay_received"
+_WAITS, _START = "wire_replay_waits", "wire_replay_start"
+_PUBLISHED, _RECEIVED = "wire_replay_published", "wire_replay_received"
 _CALLER = "/wire_replay"
 _READY_S = 60.0
 #: Of ROS itself; they say nothing of the recording.
@@ -110,12 +110,13 @@ class WireReplay:
             subscribers = self._subscribe(master, node)
             master.set_param(f"{start.node}/{_START}", True)
 
-            def published() -> bool:
+            def published() -> Any:
                 node.check_running()
-                return bool(self._param(master, _PUBLISHED))
+                return self._param(master, _PUBLISHED)
 
             try:
-                wait_until(published, timeout, f"end of the replay; it is at {self._time_ns / 1e9:.1f} s since 1970")
+                so_far = f"it is at {self._time_ns / 1e9:.1f} s since 1970"
+                report = wait_until(published, timeout, f"end of the replay; {so_far}")
                 wait_until(lambda: self._has_all(master), timeout, "delivery of all that was published")
             except HarnessError as error:
                 raise HarnessError(node.describe(str(error))) from None
@@ -125,23 +126,22 @@ class WireReplay:
                 subscriber.unregister()
             if node.returncode != 0:
                 raise HarnessError(node.describe(f"ended with status {node.returncode}"))
-            found = re.search(r"replayed [^\n\x1b]*", node.output())
-            return found.group(0) if found else ""
+            return str(report)
 
     def _subscribe(self, master: RosMaster, node: ManagedProcess) -> List[Any]:
         import rospy
 
         def published() -> List[Tuple[str, str]]:
             node.check_running()
-            # The node has advertised everything when its diagnostics' timer runs: looked at before the topics are.
-            if self._param(master, "wire_replay") is None or not self._has_begun(node):
+            # By then the node has advertised everything: looked at before the topics are.
+            if not self._param(master, _WAITS):
                 return []
             with xmlrpc.client.ServerProxy(master.uri) as api:
                 state: Any = api.getSystemState(_CALLER)
                 types: Any = api.getTopicTypes(_CALLER)
             kinds = dict(types[2])
             ours = [topic for topic, nodes in state[2][0] if self._start.node in nodes]
-            return [(topic, kinds[topic]) for topic in ours if not _left_out(topic)]
+            return [(topic, kinds[topic]) for topic in ours if topic not in _NOT_RECORDED]
 
         topics = wait_until(published, _READY_S, f"topic of {self._start.node}")
         subscribers = []
@@ -155,10 +155,6 @@ class WireReplay:
 
         wait_until(connected, _READY_S, "connection to all topics")
         return subscribers
-
-    @staticmethod
-    def _has_begun(node: ManagedProcess) -> bool:
-        return "waiting for scripts/wire_replay" in node.output()
 
     def _take(self, message: Any, topic: str) -> None:
         header = message._connection_header
@@ -185,7 +181,7 @@ class WireReplay:
             stats: Any = slave.getBusStats(_CALLER)
         # roscpp answers without the status code and its text.
         published: Any = stats[2][0] if isinstance(stats[0], int) else stats[0]
-        return {topic: max(row[3] for row in rows) for topic, rows in published if rows and not _left_out(topic)}
+        return {topic: max(row[3] for row in rows) for topic, rows in published if rows and topic not in _NOT_RECORDED}
 
     def _param(self, master: RosMaster, key: str) -> Any:
         with xmlrpc.client.ServerProxy(master.uri) as api:
@@ -217,9 +213,3 @@ def _has_header(connection: Mapping[str, str]) -> bool:
         if words and "=" not in line.split("#")[0]:
             return words[0] in ("Header", "std_msgs/Header")
     return False
-
-
-def _left_out(topic: str) -> bool:
-    # rx_node asks X-Plane for other aircraft only while traffic/state has a subscriber: one here would make it send
-    # what it has not sent then.
-    return topic in _NOT_RECORDED or topic.endswith("/traffic/state")

@@ -21,6 +21,7 @@ _COMMENT = 1
 _FLAGS, _DROPS = 2, 4  # of a packet
 _NAME, _DESCRIPTION, _RESOLUTION, _OFFSET = 2, 3, 9, 14  # of an interface
 _LONGEST = 1 << 28  # [bytes] of a block: beyond it the file is damaged
+_LONGEST_OPTION = 0xFFFC  # [bytes] its length has 16 bits
 
 
 class CaptureError(XplaneBridgeError):
@@ -69,7 +70,7 @@ class Capture:
     def __init__(self, data: bytes, name: str) -> None:
         self.name = name
         self.interfaces: List[Interface] = []
-        self.comment = ""  #: of the first section
+        self.comment = ""  #: of the first section; several in one
         self.cut = False  #: the file ends within a block; known once packets() is through
         self._data = data
         self._order = "<"
@@ -146,7 +147,7 @@ class Capture:
                 return
             body = self._data[at + 8 : at + size - 4]
             if kind == _SECTION and not self.comment:
-                self.comment = self._text(self._options(body, 16), _COMMENT)
+                self.comment = b"".join(self._options(body, 16).get(_COMMENT, [])).decode("utf-8", "replace")
             elif kind == _INTERFACE:
                 self.interfaces.append(self._interface(body))
             elif kind == _PACKET:
@@ -213,11 +214,11 @@ def write_pcapng(
     Args:
         interfaces: link type, name and description of each.
         packets: in the order of the file.
-        comment: of the section.
+        comment: of the section, of any length.
         application: that wrote it.
     """
     head = struct.pack("<IHHq", _BYTE_ORDER, 1, 0, -1)
-    yield _block(_SECTION, head + _option(4, application.encode()) + _option(_COMMENT, comment.encode()) + b"\0" * 4)
+    yield _block(_SECTION, head + _option(4, application.encode()) + b"".join(_comments(comment)) + b"\0" * 4)
     for link_type, name, description in interfaces:
         options = (
             _option(_NAME, name.encode()) + _option(_DESCRIPTION, description.encode()) + _option(_RESOLUTION, b"\x09")
@@ -235,6 +236,17 @@ def write_pcapng(
 
 def _option(code: int, value: bytes) -> bytes:
     return struct.pack("<HH", code, len(value)) + value + b"\0" * (-len(value) % 4) if value else b""
+
+
+def _comments(text: str) -> Iterator[bytes]:
+    """As many as the text needs, whole characters in each."""
+    data = text.encode()
+    while data:
+        end = min(len(data), _LONGEST_OPTION)
+        while end < len(data) and data[end] & 0xC0 == 0x80:
+            end -= 1
+        yield _option(_COMMENT, data[:end])
+        data = data[end:]
 
 
 def _block(kind: int, body: bytes) -> bytes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import xmlrpc.client
 from pathlib import Path, PurePosixPath
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Set, Tuple
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple
 
 from xplane_bridge.wire_log import records
 from xplane_bridge.wire_log.capture import Capture, CaptureError, Packet
@@ -13,6 +13,8 @@ from xplane_bridge.wire_log.datagrams import USER0, Address, datagram_in
 
 #: Inputs of that name are files.
 USER_FILE = b"file "
+#: Of what the head says.
+_END = "</value>"
 _PART = re.compile(r"_part(\d+)$")
 
 
@@ -71,17 +73,20 @@ class OwnLog:
     def events(self) -> Iterator[Event]:
         """The records, up to the first gap.
 
+        Where the first part is gone, a replay opens its sources at other times than the node did, and the log does not
+        say which were closed before: all sources of a name are one.
+
         Raises:
             CaptureError: A part is damaged.
         """
         self.sources, self.problem = [], ""
         dropped: Dict[int, int] = {}
+        numbers: List[int] = []  # of the source, by interface
         number: Optional[int] = None
+        begins_late = False
         for part in self.parts():
             capture = Capture.open(part)
-            opened: Set[int] = set()
             for packet in capture.packets():
-                yield from self._opened(capture, opened)
                 notes = dict(item.split("=", 1) for item in packet.comment.split(" ") if "=" in item)
                 if "n" not in notes:
                     self.problem = f"{part} was changed by another program: a packet has no number"
@@ -89,36 +94,40 @@ class OwnLog:
                 if number is not None and int(notes["n"]) != number:
                     self.problem = f"{part} has a gap before packet {notes['n']}: packets were taken out"
                     return
+                begins_late = begins_late or (number is None and notes["n"] != "0")
+                yield from self._opened(capture, numbers, begins_late)
                 for times in filter(None, notes.get("t", "").split(";")):
                     wall, steady = times.split(",")
                     yield Event(records.WAITED, int(notes["n"]), wall_ns=int(wall), steady_ns=int(steady))
-                event = self._event(capture, packet, notes, dropped)
+                event = self._event(capture, packet, notes, numbers, dropped)
                 number = int(notes["n"]) + 1
                 if event.kind == records.LOST:
                     self.problem = f"{part} has a gap of {event.counted} records, which were not written in time"
                     return
                 if event.kind:
                     yield event
-            yield from self._opened(capture, opened)
+            yield from self._opened(capture, numbers, begins_late)
             if capture.cut:
                 self.problem = f"{part} is cut off"
                 return
 
-    def _opened(self, capture: Capture, seen: Set[int]) -> Iterator[Event]:
+    def _opened(self, capture: Capture, numbers: List[int], by_name: bool) -> Iterator[Event]:
         """Sources that the part has named since the last call, and no earlier part."""
-        for index in range(1, len(capture.interfaces)):
-            if index in seen:
-                continue
-            seen.add(index)
-            if index <= len(self.sources):
-                continue
-            interface = capture.interfaces[index]
+        for interface in capture.interfaces[1 + len(numbers) :]:
             name = interface.name.partition("/")[2]
+            names = [known for known, _ in self.sources]
+            if by_name and name in names:
+                numbers.append(names.index(name))
+                continue
+            source = len(names)
+            numbers.append(source)
             self.sources.append((name, interface.port))
-            yield Event(records.OPENED, 0, source=index - 1, peer=("0.0.0.0", interface.port), payload=name.encode())
+            yield Event(records.OPENED, 0, source=source, peer=("0.0.0.0", interface.port), payload=name.encode())
 
     @staticmethod
-    def _event(capture: Capture, packet: Packet, notes: Dict[str, str], dropped: Dict[int, int]) -> Event:
+    def _event(
+        capture: Capture, packet: Packet, notes: Dict[str, str], numbers: List[int], dropped: Dict[int, int]
+    ) -> Event:
         number, wall, steady = int(notes["n"]), int(notes["w"]), int(notes["s"])
         link_type = capture.interfaces[packet.interface].link_type
         if link_type == USER0:
@@ -127,13 +136,14 @@ class OwnLog:
                 return Event(0, number)
             if name in (b"lost", b"refused"):
                 count, place = rest.split()
-                kind = records.LOST if name == b"lost" else records.REFUSED
-                return Event(kind, number, int(place), wall, steady, counted=int(count))
+                if name == b"lost":
+                    return Event(records.LOST, number, 0, wall, steady, counted=int(count))
+                return Event(records.REFUSED, number, numbers[int(place)], wall, steady, counted=int(count))
             return Event(records.INPUT, number, 0, wall, steady, payload=packet.data)
         datagram = datagram_in(link_type, packet.data)
-        source = packet.interface - 1
         if datagram is None:
             return Event(0, number)
+        source = numbers[packet.interface - 1]
         if packet.outbound:
             refused = int(notes.get("e", "0"))
             return Event(records.SENT, number, source, wall, steady, 0, datagram.destination, refused, datagram.payload)
@@ -158,7 +168,8 @@ def about_of(capture: Capture) -> Optional[Dict[str, Any]]:
         break
     if not capture.comment.startswith("<value><struct>"):
         return None
-    text = f"<methodResponse><params><param>{capture.comment}</param></params></methodResponse>"
+    end = capture.comment.rfind(_END) + len(_END)  # other programs add comments of their own
+    text = f"<methodResponse><params><param>{capture.comment[:end]}</param></params></methodResponse>"
     try:
         value = xmlrpc.client.loads(text)[0][0]
     except Exception as error:  # expat's and xmlrpc's own, of all kinds
@@ -181,6 +192,12 @@ def user_files(log: OwnLog) -> Dict[str, bytes]:
         elif event.kind == records.RECEIVED:
             break
     return out
+
+
+def has_input(log: OwnLog, name: str) -> bool:
+    """Whether the node has had an input of that name."""
+    begin = name.encode() + b"\0"
+    return any(event.kind == records.INPUT and event.payload.startswith(begin) for event in log.events())
 
 
 def replayable(log: OwnLog) -> Iterator[bytes]:

@@ -23,7 +23,17 @@ from xplane_bridge.wire_log.capture import Capture
 from xplane_bridge.wire_log.datagrams import USER0
 from xplane_bridge.wire_log.own_log import OwnLog
 
-TOPICS = ("flight_state", "odom", "imu/data", "wind", "link_state", "mission/surfaces", "mission/engines", "datarefs")
+TOPICS = (
+    "flight_state",
+    "odom",
+    "imu/data",
+    "wind",
+    "link_state",
+    "mission/surfaces",
+    "mission/engines",
+    "datarefs",
+    "traffic/state",
+)
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +42,7 @@ def flight(new_world, tmp_path_factory):
     folder = tmp_path_factory.mktemp("wire")
     world = new_world(folder)
     try:
-        emulator = world.emulator("--fps", 60, "--fault", "drop=0.05,reorder", "--seed", 3)
+        emulator = world.emulator("--fps", 60, "--fault", "drop=0.05,reorder", "--seed", 3, "--traffic", 2)
         world.set_param("wire_log", str(folder / "wire.pcapng"))
         heard = RawTopics(world.namespace, TOPICS)
         node = world.start("rx_node", {"datarefs": [{"name": "sim/cockpit2/gauges/indicators/airspeed_kts_pilot"}]})
@@ -75,11 +85,20 @@ def test_the_log_holds_the_flight(flight):
     assert all(e.kernel_ns and 0 <= e.wall_ns - e.kernel_ns < 30e9 for e in answers)
 
 
-def test_the_replay_is_the_flight_byte_for_byte(flight):
-    namespace, path, live, folder = flight
+@pytest.fixture(scope="module")
+def replayed_flight(flight):
+    """What wire_replay says of the flight, and the bag of the replay: it has the names of the flight's publisher, as a
+    recording of the flight has."""
+    _, path, _, folder = flight
     bag = folder / "replay.bag"
     done = replay(path, "-o", bag, "--logs", folder / "logs")
     assert done.returncode == 0, done.stdout + done.stderr
+    return done, bag
+
+
+def test_the_replay_is_the_flight_byte_for_byte(flight, replayed_flight):
+    namespace, _, live, _ = flight
+    done, bag = replayed_flight
     assert " 0 otherwise than recorded" in done.stdout
     replayed = payloads_in(bag)
     for topic in (f"{namespace}/{name}" for name in TOPICS):
@@ -92,11 +111,18 @@ def test_the_replay_is_the_flight_byte_for_byte(flight):
     assert line.split()[2] == digest.hexdigest()[:16]
 
 
-def test_a_changed_byte_is_noticed(flight):
-    namespace, path, live, folder = flight
-    bag = folder / "reference.bag"
-    done = replay(path, "-o", bag)
+def test_a_replay_is_judged_also_where_ros_logs_warnings_only(flight, replayed_flight):
+    namespace, path, _, folder = flight
+    config = folder / "rosconsole.config"
+    config.write_text("log4j.logger.ros=WARN\n")
+    done = replay(path, "--against", replayed_flight[1], env={"ROSCONSOLE_CONFIG_FILE": str(config)})
     assert done.returncode == 0, done.stdout + done.stderr
+    assert " 0 otherwise than recorded" in done.stdout
+    assert f"same    {namespace}/traffic/state\n" in done.stdout
+
+
+def test_a_changed_byte_is_noticed(flight, replayed_flight):
+    namespace, path, live, folder = flight
     # One bit of the time of a frame that was published: an overtaken datagram would be left out with it or without.
     states = states_by_run_and_time(live[f"{namespace}/flight_state"])
     time = struct.pack("<f", list(states)[-50][1])
@@ -107,8 +133,7 @@ def test_a_changed_byte_is_noticed(flight):
     data[data.rindex(answer) + answer.index(time)] ^= 0x01
     other = folder / "other.rx_node.pcapng"
     other.write_bytes(data)
-    # The bag of the replay has the names of the flight's publisher, as a recording of the flight has.
-    done = replay(other, "--against", bag)
+    done = replay(other, "--against", replayed_flight[1])
     assert done.returncode == 1, done.stdout + done.stderr
     assert f"DIFFERS {namespace}/flight_state" in done.stdout
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 
@@ -36,9 +37,10 @@ class SteppedEmulator:
         world: the test's.
         version: X-Plane's.
         port: to listen on; 0: a free one.
+        aircraft: that it flies.
     """
 
-    def __init__(self, world, version: str, port: int = 0) -> None:
+    def __init__(self, world, version: str, port: int = 0, aircraft: str = "fixed_wing") -> None:
         frames = world.folder / f"frames_{version}_{port}"
         os.mkfifo(frames)
         self._frames = os.open(frames, os.O_RDWR)
@@ -46,7 +48,10 @@ class SteppedEmulator:
         self._asked = 0
         self.process = EmulatorProcess(
             world.folder,
-            ["--stepped", "--version", version, "--fps", str(FPS), "--fault", "drop=0.05,reorder", "--seed", "3"],
+            [
+                *("--stepped", "--version", version, "--fps", str(FPS), "--aircraft", aircraft),
+                *("--fault", "drop=0.05,reorder", "--seed", "3"),
+            ],
             name=f"stepped_{version}_{port}",
             port=port,
             command=["sh", "-c", f'exec "$@" < "{frames}"', "sh", sys.executable, str(program("xplane_emulator"))],
@@ -115,13 +120,16 @@ def test_a_flight_with_drops_a_restart_and_another_version_replays(world, second
     assert len(heard.payloads[states]) > 0.5 * flown
 
 
-def test_the_parts_that_were_kept_replay_without_the_first(world):
+@pytest.mark.parametrize(("aircraft", "engines"), [("fixed_wing", 2), ("multirotor", 4)])
+def test_the_parts_that_were_kept_replay_without_the_first(world, aircraft, engines):
     """The oldest part is deleted for a further one: what is left shows the same flight, from where it begins."""
+    from xplane_bridge.msg import EngineStates
+
     world.set_param("wire_log", str(world.folder / "wire.pcapng"))
     world.set_param("wire_log_size", 1)
     first = log_of(world.folder, world.namespace, "rx_node")
     heard = RawTopics(world.namespace, TOPICS)
-    emulator = SteppedEmulator(world, VERSIONS[0])
+    emulator = SteppedEmulator(world, VERSIONS[0], aircraft=aircraft)
     try:
         world.point_to(emulator.process.port)
         node = world.start("rx_node", {})
@@ -140,10 +148,16 @@ def test_the_parts_that_were_kept_replay_without_the_first(world):
     done = replay(first.with_name(f"{first.stem}_part2.pcapng"), "-o", bag)
     assert done.returncode == 0, done.stdout + done.stderr
     topic = f"{world.namespace}/flight_state"
-    there, here = (states_by_run_and_time(payloads[topic]) for payloads in (heard.payloads, payloads_in(bag)))
+    replayed = payloads_in(bag)
+    there, here = (states_by_run_and_time(payloads[topic]) for payloads in (heard.payloads, replayed))
     # It finds X-Plane first, as at every start; from there on all is there but what was lost on the wire.
     assert len(here) > max(100, 0.8 * FPS * (max(here)[1] - min(here)[1]))
     common = sorted(set(there) & set(here))
     assert len(common) > 0.8 * len(here)
     for moment in common:
         assert_same_values(here[moment], there[moment])
+    # It asks for two engines first, then for as many as there are.
+    states = [EngineStates().deserialize(payload) for payload in replayed[f"{world.namespace}/mission/engines"]]
+    assert len(states) > 10
+    assert {state.count for state in states} == {engines}
+    assert not any(math.isnan(command) for command in states[-1].throttle_command[:engines])

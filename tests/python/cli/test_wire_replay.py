@@ -6,8 +6,18 @@ import struct
 
 import numpy as np
 import pytest
+from rosbags.rosbag1 import Writer
 
-from xplane_bridge.cli.wire.wire_replay import ReplayError, compare, hashes, main, prepare, start_of
+from xplane_bridge.cli.wire.wire_replay import (
+    ReplayError,
+    asks_on_demand,
+    compare,
+    hashes,
+    main,
+    payloads_of,
+    prepare,
+    start_of,
+)
 from xplane_bridge.wire_log.capture import Capture, Packet, write_pcapng
 from xplane_bridge.wire_log.own_log import OwnLog
 
@@ -23,8 +33,9 @@ SENT = bytes([0x45, 0, 0, 29, 0, 0, 0, 0, 64, 17, 0, 0, 10, 9, 8, 6, 10, 9, 8, 7
 )
 
 
-def log(path, ordered=1):
+def log(path, ordered=1, notes=()):
     packets = [Packet(1, 5, SENT, "n=0 w=5 s=5", outbound=True)]
+    packets += [Packet(0, 6, note, f"n={number} w=6 s=6") for number, note in enumerate(notes, 1)]
     interfaces = [(147, "rx_node/notes", ""), (101, "rx_node/control", "port 50000")]
     path.write_bytes(b"".join(write_pcapng(interfaces, iter(packets), ABOUT.format(ordered=ordered), "a test")))
     return path
@@ -57,6 +68,31 @@ def test_a_late_recorder_may_begin_at_any_of_equal_messages():
         assert said(live, replayed) == words.get(max(runs), f"message {max(runs)} of 4 differs")
 
 
+def test_messages_are_in_the_order_of_recording_also_where_ros_time_goes_back(tmp_path):
+    """As with use_sim_time, where X-Plane begins anew; rosbag's index is in order of time."""
+    bag = tmp_path / "flight.bag"
+    with Writer(bag) as writer:
+        texts = [
+            writer.add_connection(topic, "std_msgs/msg/String", msgdef="string data", md5sum="0" * 32, callerid=node)
+            for topic, node in (("/a", "/x/rx_node"), ("/a", "/x/other"), ("/x/experiment", "/x/rx_node"))
+        ]
+        for number, time in enumerate((50, 60, 3, 70, 13)):
+            writer.write(texts[0], time, b"%d" % number)
+            writer.write(texts[1], time, b"another's")
+            writer.write(texts[2], time, b"of the start")
+        for entries in writer.chunks[-1].connections.values():
+            entries.sort()
+    assert payloads_of(bag, "/x/rx_node") == {"/a": [b"0", b"1", b"2", b"3", b"4"]}
+
+
+def test_other_aircraft_are_compared_where_the_log_says_when_they_were_asked_for(tmp_path):
+    assert asks_on_demand(log(tmp_path / "w.rx_node.pcapng", notes=[b"traffic wanted\0", b"close\0"]))
+    assert not asks_on_demand(log(tmp_path / "earlier.rx_node.pcapng", notes=[b"close\0"]))
+    stranger = tmp_path / "stranger.pcapng"
+    stranger.write_bytes(b"".join(write_pcapng([], iter(()), "", "a test")))
+    assert not asks_on_demand(stranger)
+
+
 def test_hashes_show_where_messages_begin():
     assert hashes({"/a": [b"12", b"3"]}) != hashes({"/a": [b"1", b"23"]})
 
@@ -83,6 +119,24 @@ def test_the_program_anonymises(tmp_path, capsys):
     assert len(list(Capture.open(out).packets())) == 1
     assert main([str(tmp_path / "nothing.pcapng")]) == 1
     assert "cannot be read: No such file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "option", ["--output", "--against", "--sent", "--xplane", "--set", "--regression", "--expect", "--logs"]
+)
+def test_what_an_anonymised_recording_has_no_use_for_is_refused(tmp_path, capsys, option):
+    path, out = log(tmp_path / "w.rx_node.pcapng"), tmp_path / "out.pcapng"
+    value = {"--xplane": "10.9.8.7", "--set": "port=49000"}.get(option, str(tmp_path / "other"))
+    assert main([str(path), "--anonymise", str(out), option, value]) == 1
+    assert f"{option}: not with --anonymise {out}" in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_x_plane_of_the_bridges_own_log_is_in_it(tmp_path, capsys):
+    path = log(tmp_path / "w.rx_node.pcapng")
+    assert main([str(path), "--xplane", "10.9.8.7", "--regression", str(tmp_path / "kept")]) == 1
+    assert "--xplane 10.9.8.7: only with a capture of another program" in capsys.readouterr().err
+    assert not (tmp_path / "kept").exists()
 
 
 def test_where_nothing_can_be_written_is_said_before_the_replay(tmp_path, capsys):

@@ -11,7 +11,7 @@ import pytest
 from pcapng import FileScanner
 from pcapng.blocks import EnhancedPacket, InterfaceDescription, SectionHeader
 
-from xplane_bridge.wire_log.capture import Capture
+from xplane_bridge.wire_log.capture import Capture, write_pcapng
 from xplane_bridge.wire_log.datagrams import USER0, datagram_in
 
 RAW_IP, INBOUND, OUTBOUND = 101, 1, 2
@@ -53,6 +53,13 @@ def test_the_file_is_one_section_with_an_interface_for_each_socket(blocks):
     assert "tx_node/flight watch" in names
     assert [block.link_type for block in interfaces] == [USER0, *[RAW_IP] * (len(names) - 1)]
     assert all(block.timestamp_resolution == 1e-9 for block in interfaces)
+
+
+def test_a_long_head_is_of_comments_that_it_can_read():
+    text = "<value>" + "\u00e4" * 70_000 + "</value>"
+    data = b"".join(write_pcapng([], iter(()), text, "a test"))
+    section = next(iter(FileScanner(io.BytesIO(data))))
+    assert "".join(section.options.get_all("opt_comment")) == text
 
 
 def test_every_packet_has_its_datagram_time_direction_and_number(blocks, ours):

@@ -10,8 +10,8 @@ import pytest
 
 from support.simulator.udp_packets import udp
 from xplane_bridge.wire_log import records
-from xplane_bridge.wire_log.capture import CaptureError, Packet, write_pcapng
-from xplane_bridge.wire_log.own_log import OwnLog, part_after, replayable
+from xplane_bridge.wire_log.capture import Capture, CaptureError, Packet, write_pcapng
+from xplane_bridge.wire_log.own_log import OwnLog, about_of, has_input, part_after, replayable
 
 INTERFACES = [(147, "rx_node/notes", ""), (101, "rx_node/control", "port 50001"), (101, "rx_node/flight", "port 50002")]
 
@@ -68,6 +68,47 @@ def test_parts_follow_each_other(tmp_path):
     assert [e.kind for e in log.events()] == [1, 1, 4, 4, 2, 3, 4, 5, 6, 4]
     assert OwnLog(second).parts() == [second]
     assert part_after(second, 1) == part_after(first, 2) == tmp_path / "w.rx_node_part3.pcapng"
+
+
+def test_without_its_first_part_a_log_has_one_source_of_each_name(tmp_path):
+    """Which of several was closed before is not known, and a replay opens the first anew."""
+    path = tmp_path / "w.rx_node_part2.pcapng"
+    flight = (101, "rx_node/flight", "port 50003")
+    packets = [
+        Packet(2, 1005, udp(XPLANE, OURS, b"before"), "n=7 w=1010 s=10", dropped=2),
+        Packet(3, 1006, udp(XPLANE, OURS, b"after"), "n=8 w=1011 s=11", dropped=3),
+        Packet(0, 1012, b"refused\x004 2", "n=9 w=1012 s=12"),
+    ]
+    path.write_bytes(b"".join(write_pcapng([*INTERFACES, flight], iter(packets), about(ordered=True), "a test")))
+    log = OwnLog(path)
+    assert [(e.kind, e.source, e.counted, e.payload) for e in log.events()] == [
+        (records.OPENED, 0, 0, b"control"),
+        (records.OPENED, 1, 0, b"flight"),
+        (records.RECEIVED, 1, 2, b"before"),
+        (records.RECEIVED, 1, 5, b"after"),
+        (records.REFUSED, 1, 4, b""),
+    ]
+    assert log.sources == [("control", 50001), ("flight", 50002)]
+
+
+def test_a_head_of_any_length_is_read_also_where_others_have_added_to_it(tmp_path):
+    datarefs = [f"sim/\u00e4/{i}" for i in range(9000)]
+    path = write(tmp_path / "w.rx_node.pcapng", PACKETS, about(ordered=True, own=datarefs))
+    data = path.read_bytes()
+    assert OwnLog(path).about["own"] == datarefs
+    (size,) = struct.unpack_from("<I", data, 4)
+    remark = struct.pack("<HH", 1, 8) + b"a remark"
+    head = data[8 : size - 8] + remark + bytes(4)  # before the end of the options
+    section = data[:4] + struct.pack("<I", size + len(remark)) + head + struct.pack("<I", size + len(remark))
+    remarked = about_of(Capture(section + data[size:], "remarked"))
+    assert remarked is not None
+    assert remarked["own"] == datarefs
+
+
+def test_an_input_is_found_by_its_name(tmp_path):
+    log = OwnLog(write(tmp_path / "w.rx_node.pcapng", PACKETS))
+    assert has_input(log, "service set_origin")
+    assert not has_input(log, "service")
 
 
 def test_it_ends_where_something_is_missing(tmp_path):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import subprocess
 from pathlib import Path
-from typing import Any, Callable, Sequence
+from typing import Any, Callable, Mapping, Sequence
 
 from support.deadlines import WAIT_S
 from xplane_bridge.bags.chunks import BagFile
@@ -74,10 +75,15 @@ class RawTopics:
             subscriber.unregister()
 
 
-def replay(*args: str | Path) -> subprocess.CompletedProcess[str]:
-    """Runs scripts/wire_replay."""
+def replay(*args: str | Path, env: Mapping[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+    """Runs scripts/wire_replay, with these variables beside those of this process."""
     return subprocess.run(
-        [str(program("wire_replay")), *map(str, args)], capture_output=True, text=True, timeout=REPLAY_S, check=False
+        [str(program("wire_replay")), *map(str, args)],
+        capture_output=True,
+        text=True,
+        timeout=REPLAY_S,
+        check=False,
+        env={**os.environ, **(env or {})},
     )
 
 

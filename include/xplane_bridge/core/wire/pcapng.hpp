@@ -25,6 +25,7 @@ struct Packet {
   std::string comment;
 };
 
+/// `comment` may have any length.
 void appendSection(const std::string& application, const std::string& comment, std::vector<std::uint8_t>* out);
 void appendInterface(std::uint16_t link_type, const std::string& name, const std::string& description,
                      std::vector<std::uint8_t>* out);

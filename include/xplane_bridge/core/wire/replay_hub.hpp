@@ -49,6 +49,7 @@ class ReplayHub : public DatagramHub {
     bool ready = false;  // has datagrams before the next wait
   };
 
+  bool read(std::size_t* offset, WireRecord* record) const;
   bool peek(WireRecord* record, std::size_t* after) const;
   bool skipTo(WireKind wanted, WireRecord* record);
   void findReady();

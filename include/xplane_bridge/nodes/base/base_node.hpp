@@ -311,8 +311,7 @@ class BaseNode {
   void openWire(const ParamLoader& own);
   void startWire();
   void logUserFiles();
-  void reportReplay() const;
-  /// Until who asked for the replay has all that was published.
+  /// Reports what was replayed; returns when who asked for the replay has all that was published.
   void waitForReplayDelivery();
   /// A message's callback that goes through the wire log.
   template <class Message>

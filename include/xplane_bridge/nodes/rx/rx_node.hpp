@@ -74,7 +74,7 @@ class RxNode : public BaseNode {
   void supervise();
   void adoptVersion(const core::LinkStatus& status);
   void renewSubscriptions();
-  void superviseTraffic();
+  void wantTraffic(bool wanted);
   void supervisePositionCheck();
   std::vector<std::int32_t> wantedRows() const;
 

@@ -27,8 +27,11 @@ class TrafficPublisher {
   void configure(core::SimulatorVersion version) { traffic_.configure(version); }
   /// Datarefs to ask for, the position is the index; empty while they are not wanted.
   std::vector<std::string> requests() const;
-  /// Whether the topic has got its first or lost its last subscriber since the last call: requests() have changed.
-  bool wantedChanges();
+  /// Whether the topic has subscribers.
+  bool demanded() const;
+  bool wanted() const { return wanted_; }
+  /// Returns whether that is new: requests() have changed.
+  bool want(bool wanted);
   /// An answer to requests().
   void onRref(const core::RrefView& datagram, std::int64_t receive_ns, const core::ClockFilter& clock);
   /// The link came up anew.

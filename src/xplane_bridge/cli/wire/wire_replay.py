@@ -29,6 +29,11 @@ _NOT_REPLAYED = ("wire_log", "wire_log_size", "wire_log_parts", "listen_for_beac
 
 #: Says how a node was started, and so another thing of a replay.
 _OF_THE_START = "/experiment"
+#: That it has a subscriber is this input of a log. Where the log has none (an earlier version's, or a later part), the
+#: replay does not ask X-Plane for it.
+_ON_DEMAND, _DEMAND = "/traffic/state", "traffic wanted"
+#: Options beside which --anonymise would leave them undone.
+_OF_A_REPLAY = ("output", "against", "sent", "xplane", "set", "regression", "expect", "logs")
 #: Of the names of captures.
 _ENDINGS = (".pcapng", ".pcap", ".cap")
 #: Where something cannot be written.
@@ -112,22 +117,29 @@ def _longest_run(payloads: Sequence[bytes], here: Sequence[bytes]) -> int:
 
 
 def payloads_of(bag: Path, node: str) -> Dict[str, List[bytes]]:
-    """The payloads of all topics of a node in a bag."""
+    """The payloads of all topics of a node in a bag, in the order in which they were recorded."""
     try:
         file = BagFile(bag)
     except OSError as error:
         msg = f"{bag} cannot be read: {error.strerror}; expected the bag of the flight"
         raise ReplayError(msg) from None
     try:
-        out: Dict[str, List[bytes]] = {}
+        found: Dict[str, List[Tuple[int, bytes]]] = {}
         for connection in file.connections.values():
             of_ros = connection.topic in ("/rosout", "/diagnostics") or connection.topic.endswith(_OF_THE_START)
             if connection.callerid == node and not of_ros:
-                for _, messages in file.by_chunk(connection.id):
-                    out.setdefault(connection.topic, []).extend(messages)
-        return out
+                payloads = (payload for _, chunk in file.by_chunk(connection.id) for payload in chunk)
+                # The index is in order of time in each chunk, and with use_sim_time that goes back.
+                placed = zip(file.places(connection.id).tolist(), payloads)
+                found.setdefault(connection.topic, []).extend(placed)
+        return {topic: [payload for _, payload in sorted(placed)] for topic, placed in found.items()}
     finally:
         file.close()
+
+
+def asks_on_demand(path: Path) -> bool:
+    """Whether a replay of the recording asks for other aircraft where the node did."""
+    return _is_own(path) and own_log.has_input(OwnLog(path), _DEMAND)
 
 
 def start_of(log: OwnLog) -> Start:
@@ -203,7 +215,7 @@ def prepare(path: Path, file: Path, xplane: Optional[str], given: Mapping[str, A
     Raises:
         CaptureError, ReplayError: It cannot be replayed.
     """
-    if own_log.about_of(Capture.open(path)) is not None:
+    if _is_own(path):
         log = OwnLog(path)
         start = start_of(log)
         with file.open("wb") as out:
@@ -226,6 +238,10 @@ def prepare(path: Path, file: Path, xplane: Optional[str], given: Mapping[str, A
         word += f"; {strange.nameless} values have no name, their requests were not captured"
     word = "; ".join([word, *strange.left_out()])
     return Start("rx_node", f"{NAMESPACE}/rx_node", NAMESPACE, {**shared, **given}, {}), word
+
+
+def _is_own(path: Path) -> bool:
+    return own_log.about_of(Capture.open(path)) is not None
 
 
 def _parameter(text: str) -> Tuple[str, Any]:
@@ -258,7 +274,7 @@ def _write_anonymised(path: Path, to: Path, written: List[Path]) -> Anonymiser:
     Raises:
         CaptureError, ReplayError: It cannot be read, or something is there already.
     """
-    is_own = own_log.about_of(Capture.open(path)) is not None
+    is_own = _is_own(path)
     parts = OwnLog(path).parts() if is_own else [path]
     outputs = [to, *(own_log.part_after(to, count) for count in range(1, len(parts)))]
     # Of a wire log a reader would take one more for the next part.
@@ -339,6 +355,10 @@ def _replay(args: argparse.Namespace, folder: Path) -> int:
     written: List[Path] = []  # and of no use, unless all goes well
     try:
         if args.anonymise:
+            given = next((name for name in _OF_A_REPLAY if getattr(args, name)), None)
+            if given is not None:
+                msg = f"--{given}: not with --anonymise {args.anonymise}, which replays nothing: leave one of them out"
+                raise ReplayError(msg)
             _write_anonymised(args.file, args.anonymise, written)
             return 0
         return _play(args, folder, written)
@@ -350,6 +370,12 @@ def _replay(args: argparse.Namespace, folder: Path) -> int:
 
 def _play(args: argparse.Namespace, folder: Path, written: List[Path]) -> int:
     path, options = args.file, Options(args.xplane, dict(args.set))
+    if args.xplane and _is_own(path):
+        msg = (
+            f"--xplane {args.xplane}: only with a capture of another program, and {path} is a wire log of the bridge, "
+            "which has X-Plane's address itself: leave it out"
+        )
+        raise ReplayError(msg)
     if args.output and args.output.exists():
         msg = f"--output {args.output}: is there already and is kept: delete it, or give another name"
         raise ReplayError(msg)
@@ -392,7 +418,10 @@ def _play(args: argparse.Namespace, folder: Path, written: List[Path]) -> int:
     code = 0 if expected is None else _say(_judge(expected.topics, found))
     if not args.against:
         return code
-    verdicts = compare(payloads_of(args.against, start.node), messages)
+    live = payloads_of(args.against, start.node)
+    if not asks_on_demand(path):
+        live = {topic: payloads for topic, payloads in live.items() if not topic.endswith(_ON_DEMAND)}
+    verdicts = compare(live, messages)
     if not verdicts:
         msg = f"{args.against} has no topic of {start.node}"
         raise ReplayError(msg)

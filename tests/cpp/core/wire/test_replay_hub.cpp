@@ -116,7 +116,57 @@ TEST_F(ReplayHubTest, SourcesAreFoundByTheirNames) {
   EXPECT_EQ(replay->open("flight", {})->localPort(), 50002);
   UdpSocketOptions options;
   options.bind_port = 77;
-  EXPECT_EQ(replay->open("flight", options)->localPort(), 77);  // of another version of the node
+  EXPECT_EQ(replay->open("more", options)->localPort(), 77);  // of another version of the node
+}
+
+TEST_F(ReplayHubTest, ASourceMoreThanRecordedHearsWhatTheNewestOfItsNameDoes) {
+  add(WireKind::kWaited, 0, "", 1);
+  add(WireKind::kOpened, 0, "engines");
+  add(WireKind::kOpened, 1, "flight");
+  add(WireKind::kWaited, 0, "", 2);
+  add(WireKind::kReceived, 0, "first", 2);
+  add(WireKind::kWaited, 0, "", 3);
+  add(WireKind::kReceived, 0, "second", 3);
+  add(WireKind::kReceived, 1, "state", 3);
+  const auto replay = hub();
+  auto engines = replay->open("engines", {});
+  const auto flight = replay->open("flight", {});
+  replay->wait(20);
+  EXPECT_EQ(receive(engines.get()), "first");
+  engines = replay->open("engines", {});  // a list of another length
+  EXPECT_EQ(engines->localPort(), 50000);
+  replay->wait(20);
+  ASSERT_TRUE(replay->hasInput(*engines));
+  EXPECT_EQ(receive(engines.get()), "second");
+  EXPECT_EQ(receive(flight.get()), "state");
+}
+
+TEST_F(ReplayHubTest, DatagramsForASourceThatIsNotOpenHoldUpNothing) {
+  add(WireKind::kWaited, 0, "", 1);
+  add(WireKind::kOpened, 0, "a");
+  add(WireKind::kOpened, 1, "traffic");
+  add(WireKind::kOpened, 2, "late");
+  add(WireKind::kWaited, 0, "", 2);
+  add(WireKind::kReceived, 1, "other aircraft", 2);
+  add(WireKind::kSent, 0, "request", 2);
+  add(WireKind::kReceived, 2, "too early", 2);
+  add(WireKind::kReceived, 0, "state", 3);
+  add(WireKind::kReceived, 1, "other aircraft", 3);
+  add(WireKind::kRefused, 0, "", 3, 7);
+  add(WireKind::kWaited, 0, "", 4);
+  add(WireKind::kReceived, 2, "in time", 4);
+  const auto replay = hub();
+  const auto a = replay->open("a", {});
+  replay->wait(20);
+  EXPECT_TRUE(send(a.get(), "request"));
+  ASSERT_TRUE(replay->hasInput(*a));
+  EXPECT_EQ(receive(a.get()), "state");
+  EXPECT_EQ(a->counters().refused, 7U);
+  EXPECT_EQ(progress_->sent_otherwise, 0U);
+  const auto late = replay->open("late", {});
+  replay->wait(20);
+  EXPECT_EQ(receive(late.get()), "in time");
+  EXPECT_EQ(progress_->datagrams, 2U);
 }
 
 TEST_F(ReplayHubTest, InputsComeBetweenDatagramsAndSendingsAreCompared) {

@@ -24,7 +24,8 @@ using Bytes = std::vector<std::uint8_t>;
 struct Block {
   std::uint32_t type = 0;
   Bytes body;
-  std::map<std::uint16_t, Bytes> options;
+  std::map<std::uint16_t, Bytes> options;  // the last of each
+  std::vector<std::string> comments;
 
   std::string text(std::uint16_t code) const {
     const auto found = options.find(code);
@@ -60,6 +61,7 @@ std::vector<Block> blocksOf(const std::string& path) {
       if (code == 0) break;
       const auto begin = block.body.begin() + static_cast<std::ptrdiff_t>(option + 4);
       block.options[code] = Bytes(begin, begin + length);
+      if (code == 1) block.comments.emplace_back(begin, begin + length);
       option += 4U + (length + 3U) / 4U * 4U;
     }
     out.push_back(block);
@@ -150,6 +152,19 @@ TEST_F(WireLogTest, IsPcapngWithOneInterfaceForEachSource) {
   EXPECT_EQ(Bytes(packet.begin() + 28, packet.end()), answer);
   EXPECT_EQ(blocks[4].options.at(2), (Bytes{2, 0, 0, 0}));
   EXPECT_EQ(blocks[4].stamp(), 1'700'000'000'000'000'456);
+}
+
+TEST_F(WireLogTest, AHeadOfAnyLengthIsWholeInSeveralComments) {
+  const std::string two_bytes = "\u00e4";
+  options_.about = "<";
+  while (options_.about.size() < 150'000) options_.about += two_bytes;
+  { WireFile file(options_); }
+  const std::vector<std::string> comments = blocksOf(path()).at(0).comments;
+  ASSERT_EQ(comments.size(), 3U);
+  EXPECT_EQ(comments[0] + comments[1] + comments[2], options_.about);
+  for (const std::string& each : comments) {
+    EXPECT_EQ(each.substr(each.size() - 2), two_bytes);  // whole characters
+  }
 }
 
 TEST_F(WireLogTest, LeavesOutWhatHasNoRoomAndSaysHowMuch) {
