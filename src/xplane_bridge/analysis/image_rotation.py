@@ -9,8 +9,8 @@ import numpy as np
 
 from xplane_bridge.analysis.latency import Motion
 
-#: Longest pause between two pictures that are compared [s].
-_MAX_PAUSE_S = 0.2
+#: Two pictures are compared that are less than this apart [s].
+MAX_PAUSE_S = 0.2
 _FEATURES = 300
 _MIN_INLIERS = 25
 _MAX_TURN_RAD = 0.35
@@ -65,7 +65,7 @@ def rotation_motion(pictures: Iterable[tuple[float, np.ndarray]], ignore_bottom:
         if mask is None or mask.shape != picture.shape:
             mask = np.full(picture.shape, 255, np.uint8)
             mask[round(picture.shape[0] * (1.0 - ignore_bottom)) :] = 0
-        if before is not None and 0.0 < stamp - before[0] < _MAX_PAUSE_S and before[1].shape == picture.shape:
+        if before is not None and 0.0 < stamp - before[0] < MAX_PAUSE_S and before[1].shape == picture.shape:
             angle = rotation_between(before[1], picture, mask)
             if angle is not None:
                 begin.append(before[0])

@@ -30,6 +30,10 @@ class LatencyError(XplaneBridgeError):
     """The recording does not determine the delay; the text says why and what to record instead."""
 
 
+class TooFewSamplesError(LatencyError):
+    """The recording holds too little motion that is known on both sides."""
+
+
 class Motion(NamedTuple):
     """Increments of the late signal between pairs of samples."""
 
@@ -72,7 +76,7 @@ def fit_delay(
         gaps: [s] begin and end of stretches in which the leading signal is not known: what may lie there is left out.
 
     Raises:
-        LatencyError: Too few samples, or the two signals do not belong together.
+        TooFewSamplesError: The recording is too short, or most of it was left out.
     """
     inside = (late.begin - search[1] > lead_time[0]) & (late.end - search[0] < lead_time[-1])
     for last, first in gaps:
@@ -80,7 +84,7 @@ def fit_delay(
     begin, end, increment = late.begin[inside], late.end[inside], late.increment[inside]
     if len(begin) < _MIN_SAMPLES:
         msg = f"{len(begin)} usable samples of motion; expected {_MIN_SAMPLES} or more: record at least 30 s of flight"
-        raise LatencyError(msg)
+        raise TooFewSamplesError(msg)
     length = end - begin
 
     def rise(delay: float) -> np.ndarray:

@@ -16,11 +16,13 @@ from xplane_bridge.analysis.commands import commanded, of_controls
 from xplane_bridge.analysis.latency import (
     Delay,
     LatencyError,
+    TooFewSamplesError,
     accumulated_rotation,
     fit_delay,
     require_usable,
     value_motion,
 )
+from xplane_bridge.analysis.quality import QUALITY_WORDS
 from xplane_bridge.bags import FLIGHT_STATE, Bags
 from xplane_bridge.bags.cameras import FIRST, cameras, chosen_cameras
 from xplane_bridge.bags.segments import segments
@@ -185,17 +187,22 @@ def display_delay(bags: Bags, view: Optional[int] = None, ignore_bottom: float =
         msg = "the recording does not say where the camera looks, forward, rear or down: give --view"
         raise LatencyError(msg)
     zero = time[0]
+    stamps: List[float] = []
 
     def chosen() -> Iterator[tuple[float, np.ndarray]]:
         for stamp, picture in grey_pictures(bags, topic):
             if useful is None or stamp in useful:
-                yield 1e-9 * (stamp - zero), picture
+                stamps.append(1e-9 * (stamp - zero))
+                yield stamps[-1], picture
 
     motion = rotation_motion(chosen(), ignore_bottom)
     seconds = 1e-9 * (time - zero)
     parts = segments(time, max_gap=_LONGEST_STEP_S)
     gaps = [(seconds[before.stop - 1], seconds[after.start]) for before, after in zip(parts, parts[1:])]
-    return fit_delay(motion, seconds, accumulated_rotation(seconds, rates, axis), gaps=gaps)
+    try:
+        return fit_delay(motion, seconds, accumulated_rotation(seconds, rates, axis), gaps=gaps)
+    except TooFewSamplesError as error:
+        raise LatencyError(_why_few(frames, stamps) or str(error)) from None
 
 
 def command_responses(bags: Bags) -> dict[str, Delay]:
@@ -283,10 +290,16 @@ def _pictures(bags: Bags, name: str) -> tuple[str, Optional[Table]]:
 
 
 def _useful(frames: Table) -> tuple[set[int], Optional[np.ndarray]]:
-    """Stamps [ns] of the pictures to use: those of the view that most have; and their line of sight in body axes."""
+    """Stamps [ns] of the pictures to use: those of the view that most have; and their line of sight in body axes.
+
+    Raises:
+        LatencyError: There are none.
+    """
     views, counts = np.unique(frames["view"], return_counts=True)
     view = int(views[np.argmax(counts)])
-    use = ((frames["quality"] & _USELESS.value) == 0) & (frames["view"] == view)
+    use = ~_useless(frames) & (frames["view"] == view)
+    if not use.any():
+        raise LatencyError(_left_out(frames))
     posed = use & (frames["camera_pose_source"] != _POSE_NONE)
     if posed.any():
         x, y, z, w = (frames[f"body_to_camera.rotation.{axis}"][posed] for axis in "xyzw")
@@ -295,6 +308,42 @@ def _useful(frames: Table) -> tuple[set[int], Optional[np.ndarray]]:
     else:
         axis = np.array(_AXES[view]) if view in _AXES else None
     return {int(stamp) for stamp in frames.stamp[use]}, axis
+
+
+def _useless(frames: Table) -> np.ndarray:
+    """Whether each picture says nothing about the delay, by its quality."""
+    useless: np.ndarray = (frames["quality"] & _USELESS.value) != 0
+    return useless
+
+
+def _why_few(frames: Optional[Table], stamps: Sequence[float]) -> str:
+    """Why few pictures could be compared; empty: there are few.
+
+    Args:
+        frames: FrameStates, where they were recorded.
+        stamps: [s] of the pictures that are used.
+    """
+    from xplane_bridge.analysis.image_rotation import MAX_PAUSE_S
+
+    if frames is not None and np.mean(_useless(frames)) > 0.5:
+        return _left_out(frames)
+    period = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+    if period < 0.95 * MAX_PAUSE_S:  # just about that far apart, half of them are compared by chance
+        return ""
+    rate = 2.0 / MAX_PAUSE_S
+    return (
+        f"the pictures come too slowly, every {period:.2f} s (median): two that are compared must be less than "
+        f"{MAX_PAUSE_S:g} s apart; expected {rate:.0f} pictures/s or more: record with a higher image rate"
+    )
+
+
+def _left_out(frames: Table) -> str:
+    """Which quality of the pictures says that they are of no use, and of how many."""
+    counts = {bit: int(np.count_nonzero(frames["quality"] & bit.value)) for bit in ImageQuality if bit & _USELESS}
+    bits = ", ".join(
+        f"{count}: QUALITY_{bit.name} ({QUALITY_WORDS[str(bit.name)]})" for bit, count in counts.items() if count
+    )
+    return f"of {len(frames)} pictures these are of no use: {bits}; expected most of them without these bits"
 
 
 def _first_of_type(bags: Bags, msgtype: str) -> Optional[Table]:

@@ -27,6 +27,8 @@ class Window(NamedTuple):
     pitch_deg: float = 0.0
     view: int = 1
     rotation: Optional[tuple[float, float, float, float]] = None  #: of body_to_camera, where it is measured
+    every: int = 2  #: frames of 60 a second
+    quality: int = 0
 
 
 def belly(delay: float) -> Window:
@@ -63,7 +65,7 @@ def add_picture(
     header = bag.header(stamp_ns(t), "camera_forward_optical")
     image = {"header": header, "format": "bgr8; jpeg compressed bgr8", "data": jpeg.ravel()}
     bag.add(f"{window.topics}/image_raw/compressed", "sensor_msgs/CompressedImage", stamp_ns(t), image)
-    frame = {"header": header, "view": window.view}
+    frame = {"header": header, "view": window.view, "quality": window.quality}
     if window.rotation is not None:
         frame.update(camera_pose_source=2, body_to_camera={"rotation": dict(zip("xyzw", window.rotation))})
     bag.add(f"{window.topics}/frame_state", "xplane_bridge/FrameState", stamp_ns(t), frame)
@@ -101,8 +103,8 @@ def write_bag(
                 moved = aileron * math.sin(2.1 * shown)
                 surface = {"header": bag.header(stamp_ns(t), ""), "delta_aileron": moved}
                 bag.add("/xplane/mission/surfaces", "xplane_bridge/SurfaceStates", stamp_ns(t), surface)
-            if k % 2 == 0 and t > 0.5:
-                for window in windows:
+            for window in windows:
+                if k % window.every == 0 and t > 0.5:
                     add_picture(bag, painter, window, k, scale, flown)
 
 
@@ -185,6 +187,26 @@ def test_too_little_motion_is_one_line_and_exit_1(tmp_path: Path, capsys: pytest
     error = capsys.readouterr().err.strip()
     assert "\n" not in error
     assert "too small" in error or "do not move together" in error
+
+
+def test_pictures_that_come_too_slowly_are_the_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = tmp_path / "slow.bag"
+    write_bag(bag, Window(0.05, every=12))
+    assert main([str(bag)]) == 1
+    assert (
+        "the pictures come too slowly, every 0.20 s (median): two that are compared must be less than 0.2 s apart; "
+        "expected 10 pictures/s or more: record with a higher image rate" in capsys.readouterr().err
+    )
+
+
+def test_a_quality_that_leaves_all_pictures_out_is_the_reason(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = tmp_path / "unknown.bag"
+    write_bag(bag, belly(0.05)._replace(quality=8))  # whose view has no name: that is not the reason
+    assert main([str(bag)]) == 1
+    error = capsys.readouterr().err
+    assert "of 344 pictures these are of no use: 344: QUALITY_DISPLAY_UNKNOWN (when it appeared was not seen" in error
 
 
 def test_bag_without_pictures_is_one_line_and_exit_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
