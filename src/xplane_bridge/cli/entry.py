@@ -9,6 +9,7 @@ import importlib
 import logging
 import math
 import os
+import re
 import signal
 import sys
 import threading
@@ -19,6 +20,8 @@ from xplane_bridge.errors import XplaneBridgeError
 
 Main = Callable[..., int]
 
+#: A value below zero, or that begins with one: -1920,0 or -30/-20.
+_BELOW_ZERO = re.compile(r"-\.?\d")
 #: How long init_node may go on after a signal [s]: long for a master that answers.
 _INIT_S = 0.5
 
@@ -77,6 +80,18 @@ def number(expected: str, low: float = -math.inf, high: float = math.inf) -> Cal
         return value
 
     return convert
+
+
+def with_values_below_zero(arguments: Sequence[str]) -> List[str]:
+    """Joins such values to the options before them: argparse takes what is no plain number for another option."""
+    joined: List[str] = []
+    for argument in arguments:
+        option = joined[-1] if joined else ""
+        if _BELOW_ZERO.match(argument) and re.fullmatch(r"--[^=]+", option):
+            joined[-1] = f"{option}={argument}"
+        else:
+            joined.append(argument)
+    return joined
 
 
 #: The type of an option that takes a time or a rate.

@@ -10,6 +10,7 @@ import signal
 import sys
 from typing import TYPE_CHECKING, Callable, Optional, Sequence
 
+from xplane_bridge.cli.entry import with_values_below_zero
 from xplane_bridge.emulator.emulator import Emulator
 from xplane_bridge.emulator.flight.flight_model import FlightModelError
 from xplane_bridge.emulator.options import Options, parse
@@ -30,7 +31,7 @@ def main(arguments: Optional[Sequence[str]] = None, make: Callable[[Options], Em
     Returns:
         0, or 1 when it could not start.
     """
-    options = parse(sys.argv[1:] if arguments is None else arguments)
+    options = parse(with_values_below_zero(sys.argv[1:] if arguments is None else arguments))
     logging.basicConfig(level=logging.DEBUG if options.verbose else logging.WARNING, format="%(levelname)s %(message)s")
     try:
         emulator = make(options)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 import codecs
 import contextlib
+import sys
 import time
 from pathlib import Path
 from typing import Callable, Optional, Sequence, Tuple
 
-from xplane_bridge.cli.entry import guarded, number
+from xplane_bridge.cli.entry import guarded, number, with_values_below_zero
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.eye.calibrate import default_undo_file
 from xplane_bridge.eye.grab import TITLES, Which
@@ -28,7 +29,7 @@ class TokenError(XplaneBridgeError):
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Sends pictures until Ctrl-C, or verifies the pairing once; then 1 means that it is not as good as promised."""
     parser = _parser()
-    given = parser.parse_args(argv)
+    given = parser.parse_args(with_values_below_zero(sys.argv[1:] if argv is None else argv))
     if (given.receiver is None) != given.verify:
         parser.error("expected either HOST:PORT of capture_node, to send pictures there, or --verify, which sends none")
     token = _token(given.token_file) if given.token_file else ""
