@@ -7,16 +7,18 @@ written to a file before the first step, and restored on any exit, or by the nex
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
 import random
 import statistics
 import sys
+import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable, List, Optional, Sequence, Tuple
+from typing import Any, BinaryIO, Callable, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -47,10 +49,17 @@ _GREY_SIZE = (56, 80)
 _SAME_VALUE = 0.01
 _WRITE_TIMEOUT_S = 2.0
 _WRITE_AGAIN_S = 0.2
+#: Another eye's measurement is waited for: longer than one takes, so that capture_node, which waits for 30 s, hears.
+_ALONE_WITHIN_S = 15.0
+_ALONE_AGAIN_S = 0.1
 
 
 class CalibrationError(XplaneBridgeError):
     """The delay could not be measured."""
+
+
+class NoLockError(CalibrationError):
+    """There is no file by which the user's eyes could know of each other."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +80,70 @@ def default_undo_file() -> Path:
     return base / "xplane_bridge" / "eye_undo.json"
 
 
+@contextlib.contextmanager
+def alone_with(xplane: str) -> Iterator[None]:
+    """Keeps the user's other eyes from an X-Plane's field of view: amid steps, they would take one for the user's own.
+
+    Args:
+        xplane: Which X-Plane, HOST:PORT.
+
+    Raises:
+        CalibrationError: Another one keeps it for long.
+        NoLockError: No file by which they know of each other can be locked.
+    """
+    end = time.monotonic() + _ALONE_WITHIN_S
+    problems = []
+    with contextlib.ExitStack() as opened:
+        for folder in _lock_folders():
+            path = folder / f"eye_{xplane.replace(':', '_')}.lock"
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                file = opened.enter_context(path.open("ab"))
+                while not _locked(file):
+                    if time.monotonic() > end:
+                        raise CalibrationError(
+                            f"another xplane_eye has kept the field of view of X-Plane at {xplane} for "
+                            f"{_ALONE_WITHIN_S:g} s ({path} is locked): end it, or measure again later"
+                        )
+                    time.sleep(_ALONE_AGAIN_S)
+                break
+            except OSError as error:
+                problems.append(f"{path} cannot be locked ({error.strerror})")
+        else:
+            raise NoLockError(
+                f"{', '.join(problems)}, and without a lock another xplane_eye could change X-Plane's field of view at "
+                "the same time: it is left alone. Make one of these folders writable, or give --delay instead"
+            )
+        yield
+
+
+def _lock_folders() -> List[Path]:
+    """Where the user's eyes look for each other's lock: in the first that can be written and locked."""
+    folders = [default_undo_file().parent]
+    own = "xplane_bridge"
+    if sys.platform != "win32":  # there the temporary folder is the user's own
+        own += f"_{os.getuid()}"
+    with contextlib.suppress(FileNotFoundError):  # no temporary folder can be written either
+        folders.append(Path(tempfile.gettempdir()) / own)
+    return folders
+
+
+def _locked(file: BinaryIO) -> bool:
+    """Locks a file until it is closed, by its process's end at the latest; False while another one has locked it."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError):
+        return False
+    return True
+
+
 class UndoFile:
     """A setting of the user's while it is changed: a file, so that it outlives a killed process.
 
@@ -85,7 +158,7 @@ class UndoFile:
         self, path: Path, xplane: str, name: str = "field_of_view_deg", words: str = "X-Plane's field of view"
     ) -> None:
         self._path = path
-        self._xplane = xplane
+        self.xplane = xplane
         self._name = name
         self._words = words
 
@@ -98,7 +171,7 @@ class UndoFile:
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             with replaced(self._path) as file:
-                json.dump({"xplane": self._xplane, self._name: value}, file)
+                json.dump({"xplane": self.xplane, self._name: value}, file)
                 file.flush()
                 os.fsync(file.fileno())
         except OSError as error:
@@ -114,7 +187,7 @@ class UndoFile:
             value = float(content[self._name])
         except (OSError, ValueError, KeyError, TypeError):
             return None
-        return value if content.get("xplane") == self._xplane and math.isfinite(value) else None
+        return value if content.get("xplane") == self.xplane and math.isfinite(value) else None
 
     def forget(self) -> None:
         """Removes the file: the value is restored."""
@@ -247,6 +320,52 @@ class Calibration:
         Raises:
             CalibrationError: X-Plane does not take it.
         """
+        if self._undo.kept() is None:
+            return
+        with contextlib.ExitStack() as alone:
+            with contextlib.suppress(NoLockError):  # without a lock none measures, so none is disturbed
+                alone.enter_context(alone_with(self._undo.xplane))
+            self._give_back()
+
+    def run(self, why_not: Callable[[], str] = lambda: "") -> Delay:
+        """Takes about three seconds. X-Plane's field of view is as before when it returns or raises.
+
+        Args:
+            why_not: Gives what speaks against it, else an empty text; asked when no other eye measures any more, for
+                which it waits.
+
+        Raises:
+            CalibrationError: The delay could not or must not be measured, or the field of view not be restored.
+        """
+        with alone_with(self._undo.xplane):
+            self._give_back()
+            reason = why_not()
+            if reason:
+                raise CalibrationError(reason)
+            own = self._read()
+            if not math.isfinite(own):
+                raise CalibrationError("X-Plane does not say its field of view. Give --delay instead")
+            self._undo.keep(own)
+            self._frames.clear()  # they show the other eye's steps
+            self._pictures.clear()
+            try:
+                self._step(own)
+            except BaseException:
+                with contextlib.suppress(CalibrationError):  # which would hide Ctrl-C
+                    self._give_back()
+                raise
+            self._give_back()
+        return settle(list(self._frames), list(self._pictures))
+
+    def _step(self, own: float) -> None:
+        other = own + _STEP_DEG if own + _STEP_DEG <= _WIDEST_DEG else own - _STEP_DEG
+        self._wait(_SETTLE_S)
+        for step in range(_STEPS):
+            self._write(names.FIELD_OF_VIEW, own if step % 2 else other)
+            self._wait(random.uniform(*_BETWEEN_S))
+        self._wait(_SETTLE_S)
+
+    def _give_back(self) -> None:
         value = self._undo.kept()
         if value is None:
             return
@@ -255,28 +374,6 @@ class Calibration:
                 f"X-Plane does not take its field of view of {value:g} deg back; it stays noted for the next start"
             )
         self._undo.forget()
-
-    def run(self) -> Delay:
-        """Takes about three seconds. X-Plane's field of view is as before when it returns or raises.
-
-        Raises:
-            CalibrationError: The delay could not be measured, or the field of view not restored.
-        """
-        self.restore()
-        own = self._read()
-        if not math.isfinite(own):
-            raise CalibrationError("X-Plane does not say its field of view. Give --delay instead")
-        other = own + _STEP_DEG if own + _STEP_DEG <= _WIDEST_DEG else own - _STEP_DEG
-        self._undo.keep(own)
-        try:
-            self._wait(_SETTLE_S)
-            for step in range(_STEPS):
-                self._write(names.FIELD_OF_VIEW, own if step % 2 else other)
-                self._wait(random.uniform(*_BETWEEN_S))
-            self._wait(_SETTLE_S)
-        finally:
-            self.restore()
-        return settle(list(self._frames), list(self._pictures))
 
     def _set(self, value: float) -> bool:
         return write_until_reported(self._write, self._read, names.FIELD_OF_VIEW, value)

@@ -121,6 +121,7 @@ class Eye:
         self._coarse_said = False
         self._delay_was_sure = True
         self._remark = ""
+        self._give_back_s = 0.0  # when X-Plane is next asked to take its field of view back; inf: it has it
         xplane = resolved(options.xplane, "X-Plane's computer")
         name = "{}:{}".format(*xplane)
         self._undo = UndoFile(options.undo_file, name)
@@ -163,7 +164,10 @@ class Eye:
                 else:
                     self._work(lambda: None)
             finally:
-                self._grabber.stop()
+                try:
+                    self._give_back_at_the_end()
+                finally:
+                    self._grabber.stop()
 
     def _work(self, each_time: Callable[[], None]) -> None:
         with self._lock:
@@ -173,6 +177,7 @@ class Eye:
             self._send_decided()
             self._watch_delay()
             self._report_remark()
+            self._give_back()
             self._calibrate_on_request()
             each_time()
             time.sleep(_LOOK_S)
@@ -224,6 +229,7 @@ class Eye:
         said = False
         while not condition():
             self._sender.report_problem(what)
+            self._refuse_request(what)
             if not said:
                 said = True
                 self._say(what)
@@ -245,6 +251,7 @@ class Eye:
             except CalibrationError as error:
                 failed += not self._problem()  # one that the end of X-Plane or its window cut short says nothing
                 self._sender.report_problem(f"not calibrated: {error}")
+                self._refuse_request(f"xplane_eye still measures at its start, and has not yet: {error}")
                 time.sleep(_CALIBRATE_AGAIN_S)
                 continue
             return
@@ -261,7 +268,6 @@ class Eye:
         if not reason:
             return False
         self._new_calibration().restore()
-        self._calibration = None
         self._delay_was_sure = self._options.delay_s is not None
         self._say(reason)
         return True
@@ -274,12 +280,16 @@ class Eye:
         """
         self._sender.report_problem("the eye is calibrating")
         self._say("calibrating: X-Plane's field of view changes for about three seconds")
+        calibration = self._new_calibration()
+        with self._lock:
+            self._calibration = calibration
         try:
-            found = self._new_calibration().run()
+            found = calibration.run(self._why_not_now)
         except CalibrationError as error:
             self._say(f"not calibrated: {error}")
             raise
         finally:
+            self._give_back_s = 0.0
             with self._lock:
                 self._calibration = None
         with self._lock:
@@ -289,13 +299,13 @@ class Eye:
         return text
 
     def _calibrate_on_request(self) -> None:
-        """Measures the delay anew where capture_node asks for it, which it does not while it is recorded."""
+        """Measures the delay anew where capture_node asks for it."""
         if not isinstance(self._sender, Sender):
             return
         number = self._sender.take_request()
         if number == 0:
             return
-        reason = self._why_not_on_request()
+        reason = self._why_not_now()
         if reason:
             self._sender.answer(number, False, reason)
             return
@@ -308,13 +318,27 @@ class Eye:
         with self._lock:
             self._publishing = True
 
-    def _why_not_on_request(self) -> str:
+    def _refuse_request(self, reason: str) -> None:
+        """Answers at once what cannot be done soon: capture_node gives up after a while, and may record then."""
+        if isinstance(self._sender, Sender):
+            number = self._sender.take_request()
+            if number:
+                self._sender.answer(number, False, reason)
+
+    def _why_not_now(self) -> str:
+        """Why X-Plane's view must not zoom, or no picture would show it; else empty."""
         if self._options.delay_s is not None or not self._options.calibrate:
             return (
                 "xplane_eye was started with --delay or --no-calibrate, by which it leaves X-Plane's field of view "
                 "alone: start it without"
             )
-        return self._problem()
+        problem = self._problem()
+        if not problem and self._kept_by_a_recording():
+            return (
+                "capture_node's pictures are being recorded, and X-Plane's view would zoom in them: call before or "
+                "after the recording"
+            )
+        return problem
 
     def _why_not_measured(self) -> str:
         """What is said of the delay where it is not to be measured; else empty."""
@@ -322,7 +346,7 @@ class Eye:
             return f"delay: {1e3 * self._options.delay_s:.1f} ms, as given"
         if not self._options.calibrate:
             return "delay: not measured"
-        if self._recorded() and not self._options.while_recorded:
+        if self._kept_by_a_recording():
             return (
                 "delay: not measured, as capture_node's pictures are being recorded and X-Plane's view would zoom: "
                 "they are flagged DELAY_ASSUMED; after the recording, capture_node's service calibrate_display_delay "
@@ -330,16 +354,31 @@ class Eye:
             )
         return ""
 
-    def _recorded(self) -> bool:
-        if not isinstance(self._sender, Sender):
+    def _kept_by_a_recording(self) -> bool:
+        """Whether X-Plane's view must not zoom, as it is being recorded."""
+        if self._options.while_recorded or not isinstance(self._sender, Sender):
             return False
         return self._sender.recorded(_ANSWER_S)
 
     def _new_calibration(self) -> Calibration:
-        calibration = Calibration(self._stream.write, lambda: self._field_of_view_deg, self._undo)
-        with self._lock:
-            self._calibration = calibration
-        return calibration
+        return Calibration(self._stream.write, lambda: self._field_of_view_deg, self._undo)
+
+    def _give_back(self) -> None:
+        """Tries again what X-Plane, as it hung, did not take at the end of a measurement."""
+        if time.monotonic() < self._give_back_s or not self._stream.alive:
+            return
+        try:
+            self._new_calibration().restore()
+            self._give_back_s = math.inf
+        except CalibrationError:
+            self._give_back_s = time.monotonic() + _CALIBRATE_AGAIN_S
+
+    def _give_back_at_the_end(self) -> None:
+        if self._give_back_s < math.inf:
+            try:
+                self._new_calibration().restore()
+            except CalibrationError as error:
+                self._say(str(error))
 
     def _report_remark(self) -> None:
         if self._grabber.remark != self._remark:
@@ -351,9 +390,13 @@ class Eye:
         with self._lock:
             sure = self._pairing.delay_is_sure
         if self._delay_was_sure and not sure and self._options.calibrate:
+            if self._options.delay_s is None:
+                remedy = "call capture_node's service calibrate_display_delay, or start xplane_eye anew"
+            else:
+                remedy = "start xplane_eye anew with another --delay, or without"
             self._say(
                 "the delay has changed (the window's size, vertical sync?): pictures are flagged DELAY_ASSUMED; "
-                "call capture_node's service calibrate_display_delay, or start xplane_eye anew"
+                + remedy
             )
         self._delay_was_sure = sure
 

@@ -80,7 +80,7 @@ class FrameStream:
             self._socket.close()
             raise RrefError(
                 f"UDP port {local_port} is taken ({error.strerror}): does another xplane_eye run? "
-                "End it, or give each a --local-port of its own"
+                "End it, or give each a --local-port and an --undo-file of its own"
             ) from None
         self._kernel_stamps = False
         if sys.platform.startswith("linux"):

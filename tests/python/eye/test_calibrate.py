@@ -5,7 +5,12 @@ from __future__ import annotations
 import json
 import os
 import random
+import sys
+import tempfile
+import threading
+import types
 from pathlib import Path
+from typing import List
 
 import numpy as np
 import pytest
@@ -175,3 +180,133 @@ def test_an_x_plane_that_does_not_say_its_field_of_view_is_left_alone(tmp_path: 
     with pytest.raises(CalibrationError, match="does not say"):
         make(simulator, tmp_path / "undo.json").run()
     assert simulator.written == []
+
+
+def test_of_two_eyes_that_start_at_once_the_second_sees_the_users_own_value(tmp_path: Path):
+    simulator = Simulator()
+    seen: List[float] = []
+    other = Calibration(
+        simulator.write,
+        lambda: seen.append(simulator.value) or simulator.value,
+        UndoFile(tmp_path / "other.json", "here:49000"),
+        lambda _: None,
+    )
+
+    def run_other() -> None:
+        with pytest.raises(CalibrationError, match="reports 0"):
+            other.run()
+
+    thread = threading.Thread(target=run_other)
+
+    def start_other(_: float) -> None:
+        if simulator.value == 79.0 and thread.ident is None:
+            thread.start()
+            thread.join(0.3)
+
+    with pytest.raises(CalibrationError, match="reports 0"):
+        make(simulator, tmp_path / "undo.json", start_other).run()
+    thread.join(20.0)
+    assert seen[0] == 71.0
+    assert simulator.value == 71.0
+
+
+def test_an_eye_that_keeps_the_field_of_view_for_long_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(calibrate, "_ALONE_WITHIN_S", 0.2)
+    simulator = Simulator()
+    with calibrate.alone_with("elsewhere:49000"), pytest.raises(CalibrationError, match="reports 0"):
+        make(simulator, tmp_path / "undo.json").run()
+    simulator.written.clear()
+    with calibrate.alone_with("here:49000"), pytest.raises(CalibrationError, match=r"another .* for 0.2 s .* end it"):
+        make(simulator, tmp_path / "undo.json").run()
+    assert simulator.written == []
+    with calibrate.alone_with("here:49000"):
+        pass
+
+
+def test_on_windows_the_same_is_kept_by_its_own_way_of_locking(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    refusals = [PermissionError(13, "Permission denied")]
+
+    def locking(_file: int, mode: int, length: int) -> None:
+        assert (mode, length) == (2, 1)
+        if refusals:
+            raise refusals.pop()
+
+    monkeypatch.setitem(sys.modules, "msvcrt", types.SimpleNamespace(LK_NBLCK=2, locking=locking))
+    monkeypatch.setattr(sys, "platform", "win32")
+    monkeypatch.setenv("LOCALAPPDATA", str(tmp_path))
+    with calibrate.alone_with("here:49000"):
+        assert refusals == []
+    assert (tmp_path / "xplane_bridge" / "eye_here_49000.lock").is_file()
+
+
+def test_where_the_home_folder_cannot_be_written_eyes_know_of_each_other_by_a_temporary_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(calibrate, "_ALONE_WITHIN_S", 0.2)
+    simulator = Simulator()
+    with calibrate.alone_with("here:49000"), pytest.raises(
+        CalibrationError, match=r"another .*xplane_bridge_\d+/eye_h"
+    ):
+        make(simulator, tmp_path / "undo.json").run()
+    assert simulator.written == []
+    with pytest.raises(CalibrationError, match="reports 0"):
+        make(simulator, tmp_path / "undo.json").run()
+
+
+def test_where_eyes_cannot_know_of_each_other_nothing_is_changed_and_what_was_is_given_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "file"))
+    path = tmp_path / "undo.json"
+    simulator = Simulator()
+    with pytest.raises(CalibrationError, match=r"cannot be locked .*, .*cannot be locked .* left alone"):
+        make(simulator, path).run()
+    assert simulator.written == []
+    UndoFile(path, "here:49000").keep(71.0)
+    simulator.value = 79.0
+    make(simulator, path).restore()
+    assert simulator.value == 71.0
+    assert not path.exists()
+
+
+def test_what_speaks_against_it_is_asked_when_no_other_eye_measures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(calibrate, "_ALONE_WITHIN_S", 0.0)
+    simulator = Simulator()
+
+    def why_not() -> str:
+        with pytest.raises(CalibrationError, match="another"), calibrate.alone_with("here:49000"):
+            pass
+        return "it is being recorded"
+
+    with pytest.raises(CalibrationError, match="it is being recorded"):
+        make(simulator, tmp_path / "undo.json").run(why_not)
+    assert simulator.written == []
+
+
+def test_the_steps_of_another_eye_that_was_waited_for_are_not_taken_for_its_own(tmp_path: Path):
+    calibration = make(Simulator(), tmp_path / "undo.json")
+    for frame in recording(58_000_000)[0]:
+        calibration.add_frame(*frame)
+    with pytest.raises(CalibrationError, match="reports 0"):
+        calibration.run()
+
+
+def test_ctrl_c_ends_it_also_where_x_plane_does_not_take_its_value_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(calibrate, "_WRITE_TIMEOUT_S", 0.05)
+    simulator = Simulator()
+
+    def interrupt(_: float) -> None:
+        if simulator.value == 79.0:
+            simulator.takes = False
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        make(simulator, tmp_path / "undo.json", interrupt).run()
+    assert UndoFile(tmp_path / "undo.json", "here:49000").kept() == 71.0

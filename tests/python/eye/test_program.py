@@ -76,7 +76,7 @@ def test_a_taken_port_is_said():
 
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("", 0))
-        with pytest.raises(RrefError, match="another xplane_eye"):
+        with pytest.raises(RrefError, match=r"another xplane_eye.*--local-port and an --undo-file of its own"):
             FrameStream(("127.0.0.1", 49000), other.getsockname()[1], lambda _: None)
 
 
