@@ -39,14 +39,16 @@ _COLUMNS = (
     *("state.valid", "state.epoch", "state.sim_time", "state.latitude", "state.longitude", "state.altitude_msl"),
     *("state.orientation", "state.angular_velocity", "state.velocity_ned"),
 )
-#: Pictures that do not show what their state says, and why.
+#: Pictures that do not show what their state and CameraInfo say, or may not, and why.
 _SHOWS_ELSE = {
     ImageQuality.FROZEN: "frozen: the same pixels while the aircraft moved",
     ImageQuality.BLACK: "black, or almost",
+    ImageQuality.FOV_ASSUMED: "the field of view was assumed, or changed just there",
 }
-#: By these a picture may be of the neighbouring frame.
+#: By these a picture may be of the neighbouring frame, or its state is not that of its very frame.
 _UNSURE = (
-    ImageQuality.OFF_FRAME
+    ImageQuality.INTERPOLATED
+    | ImageQuality.OFF_FRAME
     | ImageQuality.DISPLAY_UNKNOWN
     | ImageQuality.CLOCK_UNSURE
     | ImageQuality.DELAY_ASSUMED
@@ -88,7 +90,8 @@ class _Seen:
         self.frames = bags.read(camera.frames, _COLUMNS)
         self.infos = _optics(bags, camera.info)
         self.suns = _suns(bags, self.frames.stamp)
-        self._late = _late(bags, self.frames)
+        between = (self.frames["quality"] & int(ImageQuality.INTERPOLATED)) != 0
+        self._off = np.where(between, _half_spacing(bags, self.frames), _late(bags, self.frames))
 
     def quality(self, row: int) -> int:
         """Give QUALITY_* of a picture."""
@@ -96,7 +99,7 @@ class _Seen:
 
     def pose(self, row: int) -> Pose:
         """Give where a picture's camera was."""
-        return _pose(self.frames, row, float(self._late[row]))
+        return _pose(self.frames, row, float(self._off[row]))
 
     def optics(self, row: int) -> Optics:
         """Give what a picture's camera shows."""
@@ -235,7 +238,7 @@ def label_flight(
     def about() -> dict[str, Any]:
         if not flight.labelled:
             reasons = ", ".join(f"{count}: {reason}" for reason, count in flight.left_out.items())
-            remedy = "record with this version, from X-Plane's own window"
+            remedy = "record with this version, from the whole of X-Plane's own window"
             msg = f"{bags.paths[0]}: no picture can be labelled ({reasons}); {remedy}"
             raise LabelError(msg)
         return {**flight.about(), "left_out": dict(sorted(flight.left_out.items()))}
@@ -286,16 +289,40 @@ def _late(bags: Bags, frames: Table) -> np.ndarray:
 
     Earlier versions gave what was shown within the display delay of a pause's beginning the state of the pause.
     """
-    delay = np.nan_to_num(frames["display_delay"].astype(np.float64))
-    late = np.where(frames["quality"] & int(ImageQuality.PAUSED), delay, 0.0)
+    late = np.where(frames["quality"] & int(ImageQuality.PAUSED), _delay(frames), 0.0)
     topic = bags.topic_of_type(FLIGHT_STATE)
     if topic is None or not bags.topics[topic].count or not late.any():
         return late
     states = bags.read(topic, ["sim_time"])
     order = np.argsort(states.stamp, kind="stable")
-    due = np.interp(frames.stamp - 1e9 * delay, states.stamp[order], states["sim_time"][order].astype(np.float64))
+    due = np.interp(_drawn(frames), states.stamp[order], states["sim_time"][order].astype(np.float64))
     bounded: np.ndarray = np.clip(frames["state.sim_time"] - due, 0.0, late)
     return bounded
+
+
+def _half_spacing(bags: Bags, frames: Table) -> np.ndarray:
+    """How far pictures' times are from the nearer of the received states around them, at most [s]; 0: not recorded."""
+    topic = bags.topic_of_type(FLIGHT_STATE)
+    if topic is None or bags.topics[topic].count < 2:
+        return np.zeros(len(frames.stamp))
+    states = bags.read(topic, ["sim_time"])
+    order = np.argsort(states.stamp, kind="stable")
+    after = np.clip(np.searchsorted(states.stamp[order], _drawn(frames)), 1, len(order) - 1)
+    steps = np.diff(states["sim_time"][order].astype(np.float64))
+    half: np.ndarray = 0.5 * np.maximum(steps[after - 1], 0.0)  # back: another flight
+    return half
+
+
+def _delay(frames: Table) -> np.ndarray:
+    """From pictures' frames to their display [s]; 0 where it is not known."""
+    delay: np.ndarray = np.nan_to_num(frames["display_delay"].astype(np.float64))
+    return delay
+
+
+def _drawn(frames: Table) -> np.ndarray:
+    """When pictures' frames were drawn, by the clock of the states' stamps [ns]."""
+    drawn: np.ndarray = frames.stamp - 1e9 * _delay(frames)
+    return drawn
 
 
 def _ground(bags: Bags, standing: Optional[float]) -> Optional[Ground]:
@@ -309,8 +336,8 @@ def _ground(bags: Bags, standing: Optional[float]) -> Optional[Ground]:
     return Ground(states["latitude"][good], states["longitude"][good], height, sigma)
 
 
-def _pose(frames: Table, row: int, late: float = 0.0) -> Pose:
-    """Give a picture's pose; `late` [s]: by how much its state may be of later than it shows."""
+def _pose(frames: Table, row: int, off: float = 0.0) -> Pose:
+    """Give a picture's pose; `off` [s]: by how much its state may be of another time than it shows."""
 
     def vector(path: str, axes: str = "xyz") -> np.ndarray:
         return np.array([float(frames[f"{path}.{axis}"][row]) for axis in axes])
@@ -332,6 +359,6 @@ def _pose(frames: Table, row: int, late: float = 0.0) -> Pose:
         place if math.isfinite(place) else 0.0,
         float(np.linalg.norm(rates)) if np.isfinite(rates).all() else _TURN_RATE,
         velocity if np.isfinite(velocity).all() else np.full(3, _SPEED / math.sqrt(3.0)),
-        max(period, late),
-        bool(quality & _UNSURE) or late > 0.5 * period,
+        max(period, off),
+        bool(quality & _UNSURE) or off > 0.5 * period,
     )

@@ -91,7 +91,7 @@ def test_a_table_that_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str
 def test_pictures_that_cannot_be_labelled_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "flight.bag"
     with FlightBag(path) as bag:
-        for k in range(11):
+        for k in range(13):
             ns = stamp_ns(0.1 * k)
             changes = {
                 1: {"camera_pose_source": 1},
@@ -102,6 +102,8 @@ def test_pictures_that_cannot_be_labelled_are_counted(tmp_path: Path, capsys: py
                 8: {"quality": 8},
                 9: {"quality": 32 | 8},
                 10: {"quality": 64},
+                11: {"quality": 1024},
+                12: {"quality": 2},
             }.get(k, {})
             frame = frame_state(bag, scene(0.1 * k), ns, **changes)
             if k == 3:
@@ -112,7 +114,7 @@ def test_pictures_that_cannot_be_labelled_are_counted(tmp_path: Path, capsys: py
                 bag.add("/xplane/camera/camera_info", "sensor_msgs/CameraInfo", ns, info)
     assert label(path) == 0
     out = capsys.readouterr().out.splitlines()
-    assert out[0].endswith(f"5 pictures labelled; XEMU of {airport_file()}")
+    assert out[0].endswith(f"6 pictures labelled; XEMU of {airport_file()}")
     assert out[2].startswith("no sun: record sun_pitch_degrees")
     assert out[3].startswith("no other aircraft")
     assert out[4:] == [
@@ -121,12 +123,13 @@ def test_pictures_that_cannot_be_labelled_are_counted(tmp_path: Path, capsys: py
         "left out: 1: no camera_info of the same stamp",
         "left out: 2: no state, or its position or attitude is not known",
         "left out: 1: the camera's pose was not measured",
+        "left out: 1: the field of view was assumed, or changed just there",
     ]
     labels = table.read(tmp_path / "flight.labels.jsonl")
-    assert [frame["quality"] for frame in labels.frames.values()] == [0, 16384, 8192, 16, 8]
+    assert [frame["quality"] for frame in labels.frames.values()] == [0, 16384, 8192, 16, 8, 2]
     assert labels.about["left_out"]["black, or almost"] == 1
     sure, *unsure = labels.frames.values()
-    for frame in unsure:  # they may be of the neighbouring frame
+    for frame in unsure:  # they may be of the neighbouring frame, the last between two states
         assert frame["objects"][1]["sigma_px"] > sure["objects"][1]["sigma_px"] + 0.1
 
 

@@ -84,3 +84,24 @@ def test_pictures_of_a_pauses_beginning_may_show_what_was_before_it(tmp_path: Pa
     else:
         assert len(unsure) == 23
         assert set(unsure.values()) == {delay}
+
+
+def test_a_state_between_two_received_ones_is_as_unsure_as_half_their_spacing(tmp_path: Path) -> None:
+    """Every sixth is received; that of 30 was lost."""
+    delay, received = 0.1, {0, 6, 12, 18, 24, 36, 42, 48, 54}
+    path = tmp_path / "flight.bag"
+    with FlightBag(path) as bag:
+        for k in range(60):
+            t = k * PERIOD
+            quality = ImageQuality.INTERPOLATED.value * (k not in received)
+            frame = frame_state(bag, scene(t), stamp_ns(t + delay), display_delay=delay, quality=quality)
+            add_picture(bag, FORWARD, np.zeros((2, 2, 3), np.uint8), frame)
+            if k in received:
+                bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(t), frame["state"])
+    with Bags(path) as bags:
+        poses = [frame.camera.pose for frame in flight_of(bags).frames()]
+    assert len(poses) == 60
+    for k, pose in enumerate(poses):
+        assert pose.may_be_neighbour == (k not in received)
+        half = 6 if 24 < k < 36 else 3
+        assert pose.period == pytest.approx(PERIOD if k in received else half * PERIOD, rel=1e-3)
