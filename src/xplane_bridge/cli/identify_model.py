@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import Optional, Sequence
+from typing import TYPE_CHECKING, Optional, Sequence
 
 from xplane_bridge.bags import Bags
 from xplane_bridge.cli.entry import guarded, number
@@ -13,6 +13,9 @@ from xplane_bridge.cli.linearise_model import add_output_arguments, write_output
 from xplane_bridge.identification.coefficients import read_geometry
 from xplane_bridge.identification.model import AXES, IdentificationError
 from xplane_bridge.plotting.page_file import refuse_recordings, write_page
+
+if TYPE_CHECKING:
+    from xplane_bridge.identification.identify import AxisResult
 
 
 def parser() -> argparse.ArgumentParser:
@@ -70,12 +73,23 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         _write_page(identification_page.build(found, flight), Path(args.report))
     if found.refusals and not args.accept:
         there = f" ({args.report} shows what was found)" if args.report else ""
-        msg = f"no model written: {'; '.join(found.refusals)}; --accept writes it all the same{there}"
+        good = [
+            f"--axis {name}{_without_validate(result, args.validate)} writes that axis alone, "
+            for name, result in found.results.items()
+            if not result.refusals
+        ]
+        msg = f"no model written: {'; '.join(found.refusals)}; {''.join(good)}--accept writes it all the same{there}"
         raise IdentificationError(msg)
     for text in found.refusals:
         print(f"warning: accepted: {text}", file=sys.stderr)
     write_outputs(found.model, args.output)
     return 0
+
+
+def _without_validate(result: AxisResult, validate: Optional[int]) -> str:
+    """For a hint to identify one axis: --validate is refused there where its excitation does not move that axis."""
+    own = [window.excitation.number for window in result.windows + result.validation]
+    return "" if validate is None or validate in own else " without --validate"
 
 
 def _write_page(page: str, path: Path) -> None:

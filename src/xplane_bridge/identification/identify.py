@@ -137,10 +137,10 @@ def identify_axis(
     """Identify one axis from its windows.
 
     Raises:
-        IdentificationError: No input moves, or the only window is to be kept for validation.
+        IdentificationError: No input moves in what is to be fitted, or the only window is to be kept for validation.
     """
-    inputs = _moved_inputs(windows, axis)
     fitted, spare = _split(windows, validate)
+    inputs = _moved_inputs(fitted, axis)
     conditions = _mean_conditions(fitted)
     found, free = _fit(fitted, axis, inputs, conditions)
     samples = [w.samples(axis, inputs) for w in fitted]
@@ -171,8 +171,12 @@ def identify_axis(
     return result
 
 
+def _moved(windows: list[Window], axis: Axis) -> tuple[Signal, ...]:
+    return tuple(s for s in axis.inputs if any(np.ptp(w.columns[s.name]) > _LEAST_INPUT_RAD for w in windows))
+
+
 def _moved_inputs(windows: list[Window], axis: Axis) -> tuple[Signal, ...]:
-    moved = tuple(s for s in axis.inputs if any(np.ptp(w.columns[s.name]) > _LEAST_INPUT_RAD for w in windows))
+    moved = _moved(windows, axis)
     if not moved:
         names = " nor ".join(signal_names(axis.inputs))
         labels = ", ".join(w.excitation.label for w in windows)
@@ -375,10 +379,17 @@ def _judge_validation(result: AxisResult, inputs: tuple[Signal, ...]) -> None:
         )
         return
     model.facts["validation"] = _goodness(result.validation, result.validated, model.axis, inputs)
+    labels = ", ".join(w.excitation.label for w in result.validation)
+    others = [s for s in _moved(result.validation, model.axis) if s not in inputs]
+    if others:
+        names = " and ".join(signal_names(others))
+        model.warnings.append(
+            f"validation: {labels} moves {names}, which no fitted window does: the model is without that input and "
+            "cannot follow the motion; fly one more manoeuvre that moves it, or keep another one with --validate"
+        )
     tested = _TESTED[model.axis.name]
     worst = max((model.facts["validation"][name]["theil"], name) for name in tested)
     if worst[0] > _WORST_VALIDATION:
-        labels = ", ".join(w.excitation.label for w in result.validation)
         model.warnings.append(
             f"validation: {worst[1]} of {labels} has a Theil coefficient of {worst[0]:.2f}, expected at most "
             f"{_WORST_VALIDATION}: the model does not hold for that window"

@@ -113,6 +113,13 @@ def test_a_window_that_is_named_validates_its_axis_and_leaves_the_other_alone(ca
         identify(calm.flight(), "lateral", validate=2)
 
 
+def test_an_input_that_only_the_validating_window_moves_is_left_out(calm: Recording) -> None:
+    rows = [row for row in calm.excitation if row["id"] in (4, 5, 7)]
+    model = identify(without(calm, excitation=rows), validate=7).results["lateral"].model
+    assert ([signal.name for signal in model.inputs], model.b.shape) == (["aileron"], (4, 1))
+    assert any("7 (3-2-1-1 on yaw) moves rudder, which no fitted window does" in text for text in model.warnings)
+
+
 def test_sensor_noise_changes_little_and_the_intervals_show_it(twin: FlightModel, truth: LinearModel) -> None:
     result = longitudinal(flown(PITCH, model=twin, noise=1.0, seed=4))
     assert error(result, truth, "short_period") < 0.025

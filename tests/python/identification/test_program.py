@@ -7,6 +7,7 @@ import re
 import shlex
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from xplane_bridge.cli import identify_model
 from xplane_bridge.cli.linearise_model import summary
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.flight.flight_model import FlightModel
-from xplane_bridge.identification import files
+from xplane_bridge.identification import files, identify
 from xplane_bridge.identification.linearisation import Condition, linearise
 from xplane_bridge.identification.model import Estimate
 
@@ -141,6 +142,24 @@ def test_turbulence_ends_with_an_error_and_the_page_shows_why(
     assert identify_model.main([str(gusty), "-o", str(model), "--accept"]) == 0
     assert "warning: accepted: longitudinal: residuals of " in capsys.readouterr().err
     assert files.read_model(model).axes["longitudinal"].a.shape == (4, 4)
+
+
+@pytest.mark.parametrize(
+    ("options", "without"), [([], ""), (["--validate", "2"], ""), (["--validate", "5"], " without --validate")]
+)
+def test_where_one_axis_is_refused_it_says_how_the_other_one_is_written(
+    bag: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, options: list[str], without: str
+) -> None:
+    def refused(*arguments: Any) -> identify.Identification:
+        found = identified(*arguments)
+        found.results["lateral"].refusals.append("something else than the inputs moved the aircraft")
+        return found
+
+    identified = identify.identify
+    monkeypatch.setattr(identify, "identify", refused)
+    assert identify_model.main([str(bag), *options]) == 1
+    hint = f"--axis longitudinal{without} writes that axis alone, --accept writes it all the same"
+    assert f"moved the aircraft; {hint}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
