@@ -213,6 +213,58 @@ def test_commands_that_are_broken_off_leave_mode_manual(bridge, rerun, how, stat
     assert "Traceback" not in process.output()
 
 
+def test_a_reset_ends_the_commands(bridge, rerun):
+    from xplane_bridge.msg import ControlMode
+    from xplane_bridge.srv import ResetFlight
+
+    process = rerun("--commands")
+    modes = bridge.watch("control/mode", ControlMode)
+    modes.wait_for(lambda mode: mode.mode == AUTO)
+    place = {"latitude": 37.6, "longitude": 127.1, "altitude_msl": 900.0, "true_airspeed": 70.0}
+    assert bridge.call("tx_node/reset_flight", ResetFlight, **place).success
+    assert process.wait(WAIT_S) == 1
+    assert "the flight was reset or placed anew" in process.output()
+    wait_until(lambda: modes.last.mode == MANUAL, WAIT_S, "mode MANUAL")
+    modes.close()
+
+
+@pytest.fixture(scope="module")
+def hovered(tmp_path_factory):
+    """Six seconds of a flight that stands, flown in AUTO from the first state on."""
+    bag = tmp_path_factory.mktemp("hovered") / "flight.bag"
+    still = {"roll_deg": 0.0, "pitch_deg": 0.0, "true_airspeed": 0.0, "flight_path_angle_deg": 0.0}
+    with FlightBag(bag) as writing:
+        for k in range(60):
+            state = {**writing.state(k / 10, k), "latitude": 37.5, "altitude_msl": 1000.0, **still}
+            writing.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / 10), state)
+            writing.add("/xplane/control/auto", "xplane_bridge/ControlCommand", stamp_ns(k / 10), {"fields": 1})
+            if k == 0:
+                writing.add("/xplane/control/mode", "xplane_bridge/ControlMode", stamp_ns(k), {"mode": int(AUTO)})
+    return bag
+
+
+@pytest.mark.parametrize("version", ["11", "12"])
+def test_commands_from_near_the_recorded_start_are_flown_in_auto(world, hovered, version):
+    from xplane_bridge.msg import ControlMode, FlightState
+
+    place = ("--alt", 1000, "--lat", 37.5, "--lon", 127.0)
+    world.emulator("--aircraft", "multirotor", "--version", version, *place)
+    world.set_param("aircraft", "multirotor")
+    world.start("rx_node")
+    world.start("tx_node", tx_params("multirotor"))
+    flights = world.watch("flight_state", FlightState)
+    modes = world.watch("control/mode", ControlMode)
+    flights.wait_for(timeout=60.0)
+    done = run("rerun_flight", hovered, "--commands", "--namespace", world.namespace, env=world.env)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.splitlines()[-1] == "played"
+    assert "has ended" not in done.stdout
+    shown = [mode.mode for mode in modes.messages]
+    began = shown.index(AUTO)
+    ended = shown.index(MANUAL, began)
+    assert modes.messages[ended].sim_time - modes.messages[began].sim_time > 4.0
+
+
 def test_where_the_bridge_is_gone_it_says_what_to_do(bridge, rerun):
     """The last test of this bridge."""
     process = rerun("--pose")
@@ -232,6 +284,7 @@ def test_where_the_bridge_is_gone_it_says_what_to_do(bridge, rerun):
         (("--commands", "--output", "x"), "not with --commands or --pose"),
         (("--commands", "--pose"), "not allowed with"),
         (("--pose", "--output", "x"), "not with --commands or --pose"),
+        (("--namespace", "/other"), "without --commands or --pose"),
         (("--commands",), "no command in it"),
     ],
 )

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import threading
+import time
 from pathlib import Path
-from typing import Any, Callable, List, NamedTuple
+from typing import Any, Callable, List, NamedTuple, Optional
 
 import numpy as np
 
 from xplane_bridge import lockstep
 from xplane_bridge.bags import FLIGHT_STATE, Bags, Table
-from xplane_bridge.cli.bridge.waiting import wait_for_service, wait_for_state
+from xplane_bridge.cli.bridge.waiting import Listener, print_waiting, wait_for_service, wait_for_state, wait_until
 from xplane_bridge.cli.entry import start_node
 from xplane_bridge.cli.flights.borrowed import Borrowed, ReplayError, answered
-from xplane_bridge.units import EARTH_RADIUS_M
+from xplane_bridge.constants import FlightMode, words
 
 _NODE = "rerun_flight"
 #: Topics that are played, with their types.
@@ -29,9 +29,13 @@ PLACED_BY = (
     "latitude", "longitude", "altitude_msl", "roll_deg", "pitch_deg", "heading_true_deg", "true_airspeed",
     "flight_path_angle_deg",
 )  # fmt: skip
-PLACED_S = 60.0  #: a flight may take so long to load
+_PLACED_S = 180.0  # tx_node waits for its load_timeout, of 120 s, and for pauses
 _MODE_S = 0.1  # between two looks whether another mode is recorded
-NEAR_M = 100.0  #: [m] within which an aircraft is where it was placed
+_MODE_NAMES = words(FlightMode)
+
+
+class NotAsAskedError(ReplayError):
+    """The outcome of reset_flight is that not all is as it was asked to be; the aircraft may be placed."""
 
 
 class Played(NamedTuple):
@@ -101,7 +105,7 @@ def play(commands: Commands, namespace: str, say: Callable[[str], None]) -> None
     That is mode MANUAL, from which its commands time out.
 
     Raises:
-        ReplayError: The bridge refuses, or its messages are others than the recorded ones.
+        ReplayError: The bridge refuses, its messages are others than the recorded ones, or the flight is reset.
     """
     rospy = start_node(_NODE, anonymous=True, disable_signals=True)
     from xplane_bridge import msg
@@ -132,16 +136,18 @@ def play(commands: Commands, namespace: str, say: Callable[[str], None]) -> None
     player = _Player(commands, publishers, types, set_mode, say)
     place(commands.start, namespace)
     with Borrowed(_NODE, rospy, give_back) as borrowed:
-        states = rospy.Subscriber(f"{namespace}/flight_state", msg.FlightState, player.on_state, tcp_nodelay=True)
+        topics = (("control/mode", msg.ControlMode, player.on_mode), ("flight_state", msg.FlightState, player.on_state))
+        heard = [rospy.Subscriber(f"{namespace}/{topic}", *rest, tcp_nodelay=True) for topic, *rest in topics]
         try:
-            if not borrowed.wait(player.placed, PLACED_S):
-                raise ReplayError(f"the aircraft is not where the recording begins {PLACED_S:g} s after reset_flight")
             say(f"playing {len(commands.messages)} messages, {commands.duration:.1f} s")
             while not borrowed.wait(player.over, _MODE_S):
                 player.change_mode()
         finally:
             player.over.set()
-            states.unregister()
+            for each in heard:
+                each.unregister()
+        if player.problem:
+            raise ReplayError(player.problem)
     say("played")
 
 
@@ -169,13 +175,16 @@ def give_stick_back(set_manual: Callable[[], Any], service: str) -> None:
 
 
 def place(start: Any, namespace: str) -> None:
-    """Asks for the aircraft to be placed as a flight state says; does not wait for it.
+    """Places the aircraft as a flight state (fields by name) says, and waits until it is: that also ends AUTO.
 
     Raises:
-        ReplayError: It is refused.
+        NotAsAskedError: tx_node says that not all of it has come about.
+        ReplayError: It is refused, or its outcome is not shown.
+        WaitError: ROS ended.
     """
     import rospy
 
+    from xplane_bridge.msg import EventList
     from xplane_bridge.srv import ResetFlight
 
     answer = rospy.ServiceProxy(f"{namespace}/tx_node/reset_flight", ResetFlight)(
@@ -183,18 +192,32 @@ def place(start: Any, namespace: str) -> None:
     )
     if not answer.success:
         raise ReplayError(f"the aircraft is not placed: {answer.result.message}")
+    events = Listener(f"{namespace}/events", EventList)  # latched: one that has come is heard, too
+    deadline = time.monotonic() + _PLACED_S
 
+    def outcome() -> Any:
+        there = events.last.events if events.last is not None else ()
+        return next((event for event in there if event.number == answer.event_number), None)
 
-def far(state: Any, start: Any) -> float:
-    """[m] from a flight state to where another one (fields by name) was."""
-    north = np.radians(state.latitude - start["latitude"])
-    turn = math.remainder(state.longitude - start["longitude"], 360.0)
-    east = np.radians(turn) * np.cos(np.radians(start["latitude"]))
-    return float(np.hypot(np.hypot(north, east) * EARTH_RADIUS_M, state.altitude_msl - start["altitude_msl"]))
+    def waits_for() -> str:
+        return f"reset_flight, whose event {answer.event_number} is not on {events.topic} yet"
+
+    try:
+        wait_until(lambda: outcome() or time.monotonic() > deadline, waits_for, print_waiting(_NODE))
+    finally:
+        events.close()
+    event = outcome()
+    if event is None:
+        raise ReplayError(
+            f"no end of reset_flight (event {answer.event_number}) on {events.topic} within {_PLACED_S:g} s: start "
+            "rerun_flight again when X-Plane has loaded the place; if tx_node has ended, start it first"
+        )
+    if not event.success:
+        raise NotAsAskedError(event.text)
 
 
 class _Player:
-    """Sends what is due at each flight state."""
+    """Sends what is due at each state of a flight that begins with the first one."""
 
     def __init__(
         self, commands: Commands, publishers: Any, types: Any, set_mode: Any, say: Callable[[str], None]
@@ -204,21 +227,25 @@ class _Player:
         self._next = 0
         self._begin = 0.0
         self._epoch: Any = None
-        self._wanted = self._mode = 0
-        self.placed, self.over = threading.Event(), threading.Event()
+        self._wanted = self._asked = 0  # none yet
+        self._shown: Optional[int] = None
+        self.over = threading.Event()
+        self.problem = ""  #: why it is over before its time
 
     def on_state(self, state: Any) -> None:
         """Takes a state of the flight."""
         if self.over.is_set():
             return
-        if not self.placed.is_set():
-            if not far(state, self._commands.start) <= NEAR_M:  # also where its place is not known
-                return
+        if self._epoch is None:
             self._begin, self._epoch = state.sim_time_unwrapped, state.epoch
-            self.placed.set()
-        if state.epoch != self._epoch:  # placed in two steps: the second one is the begin
-            self._begin, self._epoch, self._next = state.sim_time_unwrapped, state.epoch, 0
-            self._wanted = self._mode = 0  # tx_node goes to MANUAL with it
+        if state.epoch != self._epoch:
+            self.problem = (
+                "simulated time was interrupted while the recording was played: the flight was reset or placed anew, "
+                "X-Plane was lost, its own replay began or ended, or the clock of rx_node's computer was set back. The "
+                "rest is not played; start rerun_flight again"
+            )
+            self.over.set()
+            return
         now = state.sim_time_unwrapped - self._begin
         messages = self._commands.messages
         while self._next < len(messages) and messages[self._next].time <= now:
@@ -232,10 +259,16 @@ class _Player:
         if now >= self._commands.duration:
             self.over.set()
 
+    def on_mode(self, message: Any) -> None:
+        """Takes the mode that is shown; says where it ends before the recording has another one."""
+        shown, self._shown = self._shown, message.mode
+        if shown == self._asked != message.mode and not self.over.is_set():
+            self._say(f"mode {_MODE_NAMES[shown]} of the recording has ended: {message.reason}")
+
     def change_mode(self) -> None:
         """Asks for the recorded mode, where it is another; not from the thread of the states, as it waits."""
-        if self._wanted != self._mode:
-            self._mode = self._wanted
-            answer = self._set_mode(self._mode)
+        if self._wanted != self._asked:
+            self._asked = self._wanted
+            answer = self._set_mode(self._asked)
             if not answer.success:  # the flight goes on: the stick may have taken over, as it did when recorded
-                self._say(f"mode {self._mode} of the recording is not set: {answer.result.message}")
+                self._say(f"mode {_MODE_NAMES[self._asked]} of the recording is not set: {answer.result.message}")

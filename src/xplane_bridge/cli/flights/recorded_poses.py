@@ -14,14 +14,17 @@ from xplane_bridge.bags import FLIGHT_STATE, Bags
 from xplane_bridge.cli.bridge.waiting import wait_for_service, wait_for_state
 from xplane_bridge.cli.entry import start_node
 from xplane_bridge.cli.flights.borrowed import Borrowed, ReplayError, answered
-from xplane_bridge.cli.flights.recorded_commands import NEAR_M, PLACED_S, elapsed_of, far, fields_of, first_of, place
+from xplane_bridge.cli.flights.recorded_commands import NotAsAskedError, elapsed_of, fields_of, first_of, place
 from xplane_bridge.harness.pose_sender import PATH_OVERRIDE, SCENERY, PoseSender, Scenery
+from xplane_bridge.units import EARTH_RADIUS_M
 
 _NODE = "rerun_flight"
 _COLUMNS = ("latitude", "longitude", "altitude_msl", *(f"orientation.{axis}" for axis in "xyzw"))
 _VELOCITY = tuple(f"velocity_ned.{axis}" for axis in "xyz")
 _LINK_S = 30.0
 _GIVEN_BACK_S = 10.0
+_STATE_S = 10.0
+_NEAR_M = 100.0  # of its place, the scenery there is loaded
 _LOST_M = 10000.0  # further from where it was put, local coordinates mean another place
 
 
@@ -89,8 +92,7 @@ def play_poses(poses: Poses, namespace: str, say: Callable[[str], None]) -> None
         wait_for_service(f"{namespace}/{service}", _NODE)
     read = rospy.ServiceProxy(f"{namespace}/get_dataref", GetDataref)
     # By the simulator's own way first: it loads the scenery there, which moves the origin of its coordinates.
-    place(poses.start, namespace)
-    _wait_until_near(poses.start, namespace)
+    _place_near(poses.start, namespace, say)
     answers = [read(name=name, timeout=0.0) for name in SCENERY]
     for name, answer in zip(SCENERY, answers):
         if not answer.success:
@@ -146,6 +148,37 @@ def play_poses(poses: Poses, namespace: str, say: Callable[[str], None]) -> None
     say("played")
 
 
+def _place_near(start: Any, namespace: str, say: Callable[[str], None]) -> None:
+    """Places the aircraft; its attitude and speed may be others than asked for, as each pose sets them.
+
+    Raises:
+        ReplayError: It is refused, does not come about, or the aircraft is not shown near its place.
+        WaitError: ROS ended.
+    """
+    import rospy
+
+    from xplane_bridge.msg import FlightState
+
+    try:
+        place(start, namespace)
+    except NotAsAskedError as error:
+        try:
+            state = rospy.wait_for_message(f"{namespace}/flight_state", FlightState, _STATE_S)
+        except rospy.ROSException:
+            raise error from None
+        if not far(state, start) < _NEAR_M:  # also where its place is not known
+            raise
+        say(f"{error}; its place is near enough for poses")
+
+
+def far(state: Any, start: Any) -> float:
+    """[m] from a flight state to where another one (fields by name) was."""
+    north = np.radians(state.latitude - start["latitude"])
+    turn = math.remainder(state.longitude - start["longitude"], 360.0)
+    east = np.radians(turn) * np.cos(np.radians(start["latitude"]))
+    return float(np.hypot(np.hypot(north, east) * EARTH_RADIUS_M, state.altitude_msl - start["altitude_msl"]))
+
+
 def give_flight_model_back(write: Callable[[], Any], shown: Callable[[], Any]) -> None:
     """Releases the flight model.
 
@@ -173,22 +206,3 @@ def give_flight_model_back(write: Callable[[], Any], shown: Callable[[], Any]) -
         f"{PATH_OVERRIDE} is not seen given back, and the flight model may stand still: {problem}. tx_node gives "
         "it back when it ends; if it has ended already, or is to go on: scripts/release_overrides"
     )
-
-
-def _wait_until_near(start: Any, namespace: str) -> None:
-    import rospy
-
-    from xplane_bridge.msg import FlightState
-
-    there = threading.Event()
-
-    def look(state: Any) -> None:
-        if far(state, start) < NEAR_M:
-            there.set()
-
-    states = rospy.Subscriber(f"{namespace}/flight_state", FlightState, look, queue_size=1, tcp_nodelay=True)
-    try:
-        if not there.wait(PLACED_S):
-            raise ReplayError(f"the aircraft is not where the recording begins {PLACED_S:g} s after reset_flight")
-    finally:
-        states.unregister()

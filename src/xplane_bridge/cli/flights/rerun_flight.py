@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Dict, Optional, Sequence, Tuple
 
 from xplane_bridge.bags import Bags
-from xplane_bridge.bags.passport import Passport, read_passports
+from xplane_bridge.bags.passport import Passport, read_passports, shortened
 from xplane_bridge.cli import run_scenario
 from xplane_bridge.cli.entry import guarded, ros_arguments, writing
 from xplane_bridge.cli.flights.recorded_commands import play, read_commands
@@ -45,7 +45,7 @@ def parser() -> argparse.ArgumentParser:
         action="store_true",
         help="move the aircraft of a running bridge along the recorded poses; its flight model stands still meanwhile",
     )
-    p.add_argument("--namespace", type=absolute, default=NAMESPACE, metavar="NS", help="of that bridge (%(default)s)")
+    p.add_argument("--namespace", type=absolute, metavar="NS", help=f"of that bridge ({NAMESPACE})")
     return p
 
 
@@ -53,10 +53,16 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs the program."""
     args = parser().parse_args(ros_arguments(argv))
-    namespace = args.namespace.rstrip("/")
-    if (args.commands or args.pose) and args.output is not None:
+    into_bridge = args.commands or args.pose
+    if args.namespace is not None and not into_bridge:
+        raise RerunError(
+            f"--namespace {args.namespace}: without --commands or --pose a bridge of its own is started; expected one "
+            "of them, which play into a running bridge"
+        )
+    if into_bridge and args.output is not None:
         raise RerunError(f"--output {args.output}: not with --commands or --pose, which play into a running bridge")
-    if args.commands or args.pose:
+    if into_bridge:
+        namespace = (args.namespace or NAMESPACE).rstrip("/")
         with interrupted_by_signals("rerun_flight"):
             if args.commands:
                 play(read_commands(args.bag), namespace, _say)
@@ -122,5 +128,6 @@ def changes(before: Passport, after: Passport) -> Sequence[str]:
     sides: Sequence[Dict[str, Any]] = (before.lines(), after.lines())
     own = ("host", "port", "data_port")
     names = [name for name in dict.fromkeys([*sides[0], *sides[1]]) if name not in own]
-    pairs = [(name, *(side.get(name, "none") for side in sides)) for name in names]
+    texts = [(name, shortened([side.get(name) for side in sides])) for name in names]
+    pairs = [(name, *("none" if text is None else text for text in each)) for name, each in texts]
     return [f"{name}: {was} -> {now}" for name, was, now in pairs if was != now]

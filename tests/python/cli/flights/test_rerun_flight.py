@@ -57,6 +57,11 @@ def test_a_recording_is_not_flown_over(
     assert [path.name for path in tmp_path.iterdir()] == ["flight.bag"]
 
 
+def test_a_namespace_without_what_plays_into_it_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert rerun_flight.main([str(tmp_path / "flight.bag"), "--namespace", "/other"]) == 1
+    assert "--namespace /other: without --commands or --pose a bridge of its own" in capsys.readouterr().err
+
+
 def test_a_scenario_of_the_user_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
