@@ -138,7 +138,8 @@ TEST_F(GuardedProcess, ParentThatHasNotBeenWaitedForCountsAsGone) {
   kill(child_, SIGKILL);
   siginfo_t ended{};
   ASSERT_EQ(waitid(P_PID, static_cast<id_t>(child_), &ended, WEXITED | WNOWAIT), 0);  // and stays as a zombie
-  EXPECT_EQ(guardedJournal(path_, child_ + 1)->orphans(kOverridePurpose).size(), 1U) << "for the guardian of another process";
+  EXPECT_EQ(guardedJournal(path_, child_ + 1)->orphans(kOverridePurpose).size(), 1U)
+      << "for the guardian of another process";
   EXPECT_EQ(guardedJournal(path_, child_)->orphans(kOverridePurpose).size(), 1U);
 }
 
