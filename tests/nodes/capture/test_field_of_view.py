@@ -11,7 +11,7 @@ from typing import Iterator
 import pytest
 
 from support.deadlines import WAIT_S
-from support.nodes.tx_fixtures import call, journal_entries
+from support.nodes.tx_fixtures import call, journal_entries, tx_params
 from xplane_bridge import protocol
 from xplane_bridge.eye.wire import encode_hello, encode_status
 from xplane_bridge.harness import ManagedProcess, wait_until
@@ -44,7 +44,7 @@ def test_the_last_of_two_nodes_gives_the_users_own_back(world, display: str, fir
     options = {"window": {"display": display}, "set_field_of_view": True, "field_of_view_deg": CAPTURES_DEG}
     nodes = {}
     for name in ("capture_node", "tx_node") if first == "capture_node" else ("tx_node", "capture_node"):
-        nodes[name] = world.start(name, options if name == "capture_node" else {})
+        nodes[name] = world.start(name, options if name == "capture_node" else tx_params())
         if name == "tx_node":
             set_view(world, view=1, field_of_view_deg=VIEWS_DEG)
         wire.wait_until_reads(FIELD_OF_VIEW, VIEWS_DEG if name == "tx_node" else CAPTURES_DEG)
@@ -75,7 +75,7 @@ def test_a_step_of_a_calibration_is_not_taken_for_the_users_own(world, display: 
 
     wire = users_wire(world)
     capture = world.start("capture_node", {"window": {"display": display, "search_period": 0.05}})
-    tx = world.start("tx_node")
+    tx = world.start("tx_node", tx_params())
     call(world, "run_command", "RunCommand", name="sim/view/forward_with_nothing")  # it has a link
     states = world.watch("camera/frame_state", FrameState)
     states.wait_for(lambda state: abs(state.field_of_view_deg - USERS_DEG) < 1e-3, timeout=60.0)
@@ -96,7 +96,7 @@ def test_a_view_that_ends_amid_a_calibration_leaves_the_users_own(world, display
     from xplane_bridge.msg import FrameState
 
     wire = users_wire(world)
-    tx = world.start("tx_node")
+    tx = world.start("tx_node", tx_params())
     set_view(world, view=1, field_of_view_deg=VIEWS_DEG)
     capture = world.start("capture_node", {"window": {"display": display, "search_period": 0.05}})
     states = world.watch("camera/frame_state", FrameState)
