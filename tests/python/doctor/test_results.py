@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 
 import pytest
 
@@ -74,5 +75,8 @@ def test_a_card_of_an_earlier_doctor_under_another_address_of_this_computer_is_t
     older = tmp_path / f"{ETHERNET}_{PORT}_conformance.yaml"
     results.store(older, flown(REFUTED), ETHERNET, PORT)
     assert store(tmp_path, flown(CONFIRMED, id_="vehs"), ETHERNET)[0].keys() == {"row16", "vehs"}
-    results.store(older, flown(REFUTED, id_="vehs"), ETHERNET, PORT)
-    assert store(tmp_path, flown(CONFIRMED, id_="prel"), ETHERNET)[0]["vehs"]["verdict"] == "confirmed"
+    written = results.file_of(tmp_path, ETHERNET, PORT).stat().st_mtime
+    for later_s, verdict in ((-60.0, "confirmed"), (60.0, "refuted")):
+        results.store(older, flown(REFUTED, id_="vehs"), ETHERNET, PORT)
+        os.utime(older, (written + later_s, written + later_s))
+        assert store(tmp_path, flown(CONFIRMED, id_="prel"), ETHERNET)[0]["vehs"]["verdict"] == verdict

@@ -39,7 +39,7 @@ def store(file: Path, flown: Flown, address: str, port: int) -> Path:
     """
     questions: Dict[str, Any] = {}
     # Earlier versions named the file by the address that was flown, also on this computer.
-    for earlier in sorted({_named(file.parent, address, port), file}, key=_written):
+    for earlier in sorted((_named(file.parent, address, port), file), key=_written):
         questions.update(_earlier(earlier, flown.version))
     for id_, answer in flown.answers.items():
         settled = questions.get(id_, {}).get("verdict") in (Verdict.CONFIRMED.value, Verdict.REFUTED.value)
