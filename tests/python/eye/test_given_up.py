@@ -343,22 +343,17 @@ def requests(monkeypatch: pytest.MonkeyPatch) -> List[Tuple[int, bool, str]]:
     return Requests.answers
 
 
-def test_a_request_is_refused_where_a_recording_has_begun_since_it_was_made(
-    start: Callable[..., Run], requests: List[Tuple[int, bool, str]], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    "begun",
+    [
+        pytest.param("", id="since it was made"),
+        pytest.param("the eye is calibrating", id="while another eye measured"),  # for which this one waited
+    ],
+)
+def test_a_request_is_refused_where_a_recording_has_begun(
+    start: Callable[..., Run], requests: List[Tuple[int, bool, str]], monkeypatch: pytest.MonkeyPatch, begun: str
 ):
-    monkeypatch.setattr(Requests, "recorded_from", "")
-    run = start(OwnView)
-    run()
-    ((number, measured, text),) = requests
-    assert (number, measured) == (5, False)
-    assert text.startswith("capture_node's pictures are being recorded")
-    assert run.written() == []
-
-
-def test_a_recording_that_began_while_another_eye_measured_is_not_zoomed_into(
-    start: Callable[..., Run], requests: List[Tuple[int, bool, str]], monkeypatch: pytest.MonkeyPatch
-):
-    monkeypatch.setattr(Requests, "recorded_from", "the eye is calibrating")  # and waits for the other one
+    monkeypatch.setattr(Requests, "recorded_from", begun)
     run = start(OwnView)
     run()
     ((number, measured, text),) = requests
