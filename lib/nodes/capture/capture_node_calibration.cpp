@@ -141,11 +141,8 @@ std::string CaptureNode::calibrateSender() {
     frozen_check_.pictureChanged(pairingNow());
     calibrating_ = false;
   }
-  if (noted) {
-    // Not what the eye has seen before its steps, where the node that changed it has ended meanwhile.
-    const std::vector<core::UndoOperation> left = link().journal()->handOver(kFieldOfViewPurpose);
-    if (link().undo(left, kUndoTimeout)) link().journal()->remove({kFieldOfViewPurpose});
-  }
+  // Not what the eye has seen before its steps, where the node that changed it has ended meanwhile.
+  if (noted) giveNotedBack(kUndoTimeout);
   if (!answer.has_value()) {
     if (stopping()) throw std::runtime_error("the node is stopping");
     const std::lock_guard<std::mutex> lock(capture_mutex_);

@@ -139,14 +139,17 @@ void CaptureNode::recordFieldOfView(float shown) {
   journal->record(kFieldOfViewPurpose, kFieldOfViewPurpose, {core::UndoDref{path, before}});
 }
 
-void CaptureNode::undo(const Deadline& deadline) {
+void CaptureNode::giveNotedBack(double timeout_s) {
   const std::shared_ptr<core::Journal> journal = link().journal();
-  if (!journal) return;
+  const auto entry = core::ownEntry(*journal, kFieldOfViewPurpose);
+  if (!entry) return;
+  if (link().undo(journal->handOver(entry->id), timeout_s)) journal->removeUndone({*entry});
+}
+
+void CaptureNode::undo(const Deadline& deadline) {
+  if (!link().journal()) return;
   try {
-    const auto entry = core::ownEntry(*journal, kFieldOfViewPurpose);
-    if (!entry) return;
-    const std::vector<core::UndoOperation> left = journal->handOver(entry->id);
-    if (link().undo(left, std::max(deadline.left(), 0.1))) journal->removeUndone({*entry});
+    giveNotedBack(std::max(deadline.left(), 0.1));
   } catch (const core::JournalError& error) {
     ROS_ERROR("X-Plane's field of view may not be restored: %s", error.what());
   }

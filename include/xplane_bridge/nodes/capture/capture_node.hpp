@@ -130,6 +130,8 @@ class CaptureNode : public BaseNode {
   void changeFieldOfView();
   /// Writes the user's own field of view into the journal. @param shown [deg] by X-Plane, that where no entry has it
   void recordFieldOfView(float shown);
+  /// Gives back what this node has noted, but what another node still holds, and takes it out of the journal.
+  void giveNotedBack(double timeout_s);
 
   // Calibration: service's thread, but for lookForStep() (capture) and restoreFieldOfView() (timer).
   /// Who records the pictures, a clause; empty: no node does.
