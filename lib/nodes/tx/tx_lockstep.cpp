@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -22,6 +23,19 @@ std::int64_t nanoseconds(const ros::Time& stamp) { return static_cast<std::int64
 
 }  // namespace
 
+class TxLockstep::Flight {
+ public:
+  bool isHeld() const { return end_ == Held::kHeld; }
+  bool isReplaced() const { return end_ == Held::kReplaced; }
+  /// The first of its ends stays: who waits for it may wake when the next flight, too, is held.
+  void end(Held how) {
+    if (!end_) end_ = how;
+  }
+
+ private:
+  std::optional<Held> end_;
+};
+
 TxLockstep::TxLockstep(const LockstepOptions& options, core::Clock host, const ros::Time& start, Action wake,
                        std::function<void(const std::string&)> give_up)
     : options_(options),
@@ -30,7 +44,8 @@ TxLockstep::TxLockstep(const LockstepOptions& options, core::Clock host, const r
       give_up_(std::move(give_up)),
       barrier_(options.participants, kLockstepReader, kLockstepCamera),
       stamp_ns_(nanoseconds(start)),
-      previous_ns_(stamp_ns_) {
+      previous_ns_(stamp_ns_),
+      flight_(std::make_shared<Flight>()) {
   if (options.hold) barrier_.step(0);
   barrier_.open(0, stamp_ns_);
   progress();
@@ -111,7 +126,7 @@ bool TxLockstep::ready() {
     handled_ = handled;
     node_ready_ = true;
     holds = barrier_.holds();
-    if (holds) held_flight_ = flights_;
+    if (holds) flight_->end(Held::kHeld);
   }
   if (opened) opened_.notifyAll();
   if (holds) held_.notifyAll();
@@ -153,24 +168,29 @@ void TxLockstep::close() {
   progress();
 }
 
-std::uint64_t TxLockstep::step(std::uint32_t frames) {
-  std::uint64_t call = 0;
+void TxLockstep::beginFlight() {
+  flight_->end(Held::kReplaced);
+  flight_ = std::make_shared<Flight>();
+}
+
+std::shared_ptr<const TxLockstep::Flight> TxLockstep::step(std::uint32_t frames) {
+  std::shared_ptr<const Flight> flight;
   {
     const Lock lock(mutex_);
-    if (frames > 0) ++flights_;
-    call = flights_;
+    if (frames > 0) beginFlight();
+    flight = flight_;
     barrier_.step(frames);
   }
   progress();
   held_.notifyAll();
   wake_();
-  return call;
+  return flight;
 }
 
 void TxLockstep::run() {
   {
     const Lock lock(mutex_);
-    ++flights_;
+    beginFlight();
     barrier_.run();
   }
   progress();
@@ -183,11 +203,12 @@ void TxLockstep::waitUntilOpen() {
   opened_.wait(&lock, [this] { return stopped_ || handled_; });
 }
 
-TxLockstep::Held TxLockstep::waitUntilHeld(std::uint64_t call) {
+TxLockstep::Held TxLockstep::waitUntilHeld(const std::shared_ptr<const Flight>& flight) {
   std::unique_lock<std::mutex> lock(mutex_);
-  held_.wait(&lock, [this, call] { return stopped_ || flights_ != call || barrier_.holds(); });
+  const auto isHeld = [&] { return flight->isHeld() || (flight == flight_ && barrier_.holds()); };
+  held_.wait(&lock, [&] { return stopped_ || flight->isReplaced() || isHeld(); });
   if (stopped_) return Held::kStopped;
-  return flights_ == call || held_flight_ >= call ? Held::kHeld : Held::kReplaced;
+  return isHeld() ? Held::kHeld : Held::kReplaced;
 }
 
 void TxLockstep::progress() {

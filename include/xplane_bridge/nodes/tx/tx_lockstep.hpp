@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -58,17 +59,20 @@ class TxLockstep {
 
   // Services.
 
+  enum class Held : std::uint8_t { kHeld, kReplaced, kStopped };
+  /// What one call lets fly, until it is held or another call takes its place.
+  class Flight;
+
   /// Takes the place of a step that waits; 0 frames hold it where it is.
-  /// @return the call, for waitUntilHeld()
-  std::uint64_t step(std::uint32_t frames);
+  /// @return for waitUntilHeld()
+  std::shared_ptr<const Flight> step(std::uint32_t frames);
   /// Takes the place of a step that waits.
   void run();
   /// Waits until a frame is open and was handled, or stop(): a participant may have seen a frame before tx_node has,
   /// and what it asks for belongs to that frame.
   void waitUntilOpen();
-  enum class Held : std::uint8_t { kHeld, kReplaced, kStopped };
-  /// Waits until the present frame is answered and held, or another call lets it fly, or stop().
-  Held waitUntilHeld(std::uint64_t call);
+  /// Waits until the flight's last frame is answered and held, or another call lets it fly, or stop().
+  Held waitUntilHeld(const std::shared_ptr<const Flight>& flight);
   std::uint32_t frame() const { return barrier_.number(); }
 
   /// Ends the watchdog and all waiting.
@@ -86,6 +90,7 @@ class TxLockstep {
     int frames_waited;
   };
 
+  void beginFlight();  // under mutex_
   /// Lets the link's thread look, if there is something to see: an answer that is not the last one does not wake it.
   void wakeIfAnswered();
   void progress();
@@ -114,8 +119,7 @@ class TxLockstep {
   bool handled_ = false;      // the present frame, and it is not closed; of frame 0, until it is answered
   bool node_ready_ = false;   // ready() was called in the present frame
   std::int64_t progress_ns_ = 0;
-  std::uint64_t flights_ = 1;      // the one that the last call let it fly
-  std::uint64_t held_flight_ = 0;  // the last one that was held
+  std::shared_ptr<Flight> flight_;
   bool stopped_ = false;
   std::thread watchdog_;  // last: it uses all of the above
 };

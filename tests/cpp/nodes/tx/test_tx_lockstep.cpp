@@ -65,22 +65,27 @@ TEST_F(TxLockstepTest, ARequestIsCarriedOutInTheSecondFrameAfterItsOwnWheneverIt
   EXPECT_EQ(fly(5), Texts{});
 }
 
-TEST_F(TxLockstepTest, AStepThatWasFlownIsHeldAlsoWhereTheNextOneBeginsBeforeItsCallerLooks) {
+TEST_F(TxLockstepTest, WhatBecameOfAStepStandsAlsoWhereTheNextOnesEndBeforeItsCallerLooks) {
   fly(1);
   const auto answer = [this](std::uint32_t frame) {
     for (const char* who : {"/rx_node", "/player"}) lockstep_.takeDone(who, stamp(frame), "");
     return lockstep_.ready();
   };
-  const std::uint64_t first = lockstep_.step(1);
+  const auto first = lockstep_.step(1);
   open(2);
   EXPECT_TRUE(answer(2));
   close();
   open(3);
   EXPECT_FALSE(answer(3)) << "it is held";
-  const std::uint64_t second = lockstep_.step(5);
-  lockstep_.step(2);
+  const auto second = lockstep_.step(5);
+  const auto third = lockstep_.step(1);
+  EXPECT_TRUE(lockstep_.ready());
+  close();
+  open(4);
+  EXPECT_FALSE(answer(4)) << "it is held";
   EXPECT_EQ(lockstep_.waitUntilHeld(first), TxLockstep::Held::kHeld);
   EXPECT_EQ(lockstep_.waitUntilHeld(second), TxLockstep::Held::kReplaced);
+  EXPECT_EQ(lockstep_.waitUntilHeld(third), TxLockstep::Held::kHeld);
 }
 
 TEST_F(TxLockstepTest, RequestsThatAreDueTogetherHaveAnOrderOfTheirOwn) {
