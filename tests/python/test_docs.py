@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from xplane_bridge.surfaces import SURFACES
 from xplane_bridge.topics import TOPICS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -180,3 +181,17 @@ def test_the_site_is_not_built_with_a_dead_link(tmp_path):
     built = site(source, tmp_path / "site")
     assert built.returncode != 0
     assert "docs/none" in built.stderr
+
+
+def test_the_surfaces_of_the_tools_are_those_of_their_page() -> None:
+    page = (ROOT / "docs" / "control" / "surfaces.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| (`aileron1`.*?|`elevator1`.*?|`rudder1`.*?) \| (.*) \|$", page, re.MULTILINE))
+    assert len(rows) == 3
+    wings = [f"wing{wing}_{side}" for wing in range(1, 5) for side in ("left", "right")]
+    expected = set()
+    for surfaces, places in rows.items():
+        named = re.findall(r"`(\w+)`", places)
+        if "..." in places:
+            named = [place for place in named if not place.startswith("wing")] + wings
+        expected |= {f"{surface}_{place}" for surface in re.findall(r"`(\w+)`", surfaces) for place in named}
+    assert set(SURFACES) == expected

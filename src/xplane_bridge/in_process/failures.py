@@ -16,29 +16,11 @@ from xplane_bridge.emulator.flight.flight_model import (
 )
 from xplane_bridge.emulator.scenario_pilot import failure_leaves, in_part
 from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.surfaces import SURFACES
 
-_SIDES = ("left", "right")
 _MOST_STUCK_DEG = 90.0
 #: Systems whose failure does not reach the flight model: they change what instruments and busses show.
 _NOT_FLOWN = re.compile(r"rel_(esys|genera|batter|pitot|static|ss_|cop_)")
-
-
-def _surfaces() -> Dict[str, str]:
-    """The flight models' name (`wing2l_ail1`) of each surface that tx_node knows (`aileron1_wing2_left`)."""
-    names: Dict[str, str] = {}
-    leaves = {"aileron": "ail", "spoiler": "spo", "flap": "fla", "speedbrake": "sbrk", "elevator": "elv"}
-    on_wings = {f"{kind}{i}": f"{leaf}{i}" for kind, leaf in leaves.items() for i in (1, 2)}
-    for kind, leaf in {**on_wings, "yaw_brake": "yawb"}.items():
-        for wing in range(1, 5):
-            names.update({f"{kind}_wing{wing}_{side}": f"wing{wing}{side[0]}_{leaf}" for side in _SIDES})
-    for i in (1, 2):
-        names.update({f"elevator{i}_{side}": f"hstab{half}_elv{i}" for half, side in enumerate(_SIDES, 1)})
-        names.update({f"rudder{i}_fin{fin}": f"vstab{fin}_rud{i}" for fin in (1, 2)})
-    return names
-
-
-#: By the names of docs/control/surfaces.md.
-SURFACES = _surfaces()
 
 
 class NotFlownError(XplaneBridgeError, ValueError):

@@ -7,23 +7,18 @@ formulas.
 from __future__ import annotations
 
 import math
-import re
 from functools import lru_cache
 from typing import Any, Mapping, Sequence, Tuple
 
 import numpy as np
 
 from xplane_bridge.scenario.schema import ScenarioError
+from xplane_bridge.surfaces import SURFACES
 
 #: Raised cosine at both ends of a multisine and a chirp [s].
 FADE_S = 0.5
 _MOST_SINES = 2000
 _AXES = ("roll", "pitch", "yaw", "throttle")
-#: Names of docs/control/surfaces.md.
-_SURFACE = re.compile(
-    r"((aileron|spoiler|flap|speedbrake|elevator)[12]|yaw_brake)_wing[1-4]_(left|right)|elevator[12]_(left|right)|"
-    r"rudder[12]_fin[12]"
-)
 #: Samples of the highest sine's period by which the multisine's peak is found.
 _PEAK_SAMPLES = 32
 
@@ -67,7 +62,7 @@ def check(parameters: Mapping[str, Any], path: str = "excitation") -> None:
 
 def _axes(target: str, path: str) -> Sequence[str]:
     """The axes that are moved; none where it is a surface."""
-    if _SURFACE.fullmatch(target):
+    if target in SURFACES:
         return ()
     axes = target.replace(" ", "").split(",")
     if not all(axis in _AXES for axis in axes):

@@ -18,8 +18,9 @@ from xplane_bridge.emulator.flight.failure_effects import FailureEffects
 from xplane_bridge.emulator.flight.flight_model import Controls, InitialState, SurfaceFault, SurfaceFaultKind
 from xplane_bridge.emulator.simulator import Simulator
 from xplane_bridge.in_process.aircraft import AUTO, MANUAL, Aircraft, Conditions, arbiter_options
-from xplane_bridge.in_process.failures import SURFACES, Failures, NotFlownError
+from xplane_bridge.in_process.failures import Failures, NotFlownError
 from xplane_bridge.in_process.view import FlightView
+from xplane_bridge.surfaces import SURFACES
 from xplane_bridge.xplane_names import datarefs
 
 

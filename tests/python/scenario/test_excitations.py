@@ -9,8 +9,8 @@ import pytest
 
 from xplane_bridge.compiled import core
 from xplane_bridge.constants import EXCITATION_KINDS
-from xplane_bridge.in_process.failures import SURFACES
 from xplane_bridge.scenario import ScenarioError, excitations, parse_scenario
+from xplane_bridge.surfaces import SURFACES
 
 GIVEN = {
     "kind": "multisine",
