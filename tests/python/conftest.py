@@ -26,7 +26,7 @@ heed_ctrl_c()
 
 def pytest_configure(config: pytest.Config) -> None:
     """Before any test draws a port."""
-    keep_to_own_ports(config, 8)
+    keep_to_own_ports(config, 16)
 
 
 @pytest.hookimpl(optionalhook=True)
