@@ -7,9 +7,9 @@ messages read as they were; fields that came later are there too: NaN, 0, false 
 layout (all lengths inside equal) are decoded together by numpy; a topic whose lengths vary is split into its layouts,
 and only messages that hold lists of messages or of strings are decoded one by one.
 
-Where X-Plane was restarted and stamps go by its time (`publish_clock`), they go back; they are read as going on, and so
-are receive times of a recorder that goes by that time (`bags.restarts`). A warning says by how much. Where rx_node was
-restarted, epochs are counted on.
+Stamps that go back, by a host's clock that was set back or over a restart of X-Plane by whose time they go
+(`publish_clock`), are read as going on, and so are receive times of such a recorder (`bags.restarts`). A warning says
+by how much. Where rx_node was restarted, epochs are counted on.
 
 A long recording needs little memory in pieces (`Bags.pieces`), or with its columns in a temporary file (`ColumnFile`).
 
@@ -314,18 +314,20 @@ class Bags:
         streams = [self._stream(file, connection, spans) for file, connection in self._connections(topic)]
         yield from merge(*streams, key=lambda pair: pair[0])
 
-    def recorded(self, topics: Sequence[str] = ()) -> Iterator[tuple[Recorded, int, bytes]]:
-        """Yield every message undecoded: (topic, receive time [ns], serialised message), in time order.
+    def recorded(self, topics: Sequence[str] = (), as_written: bool = False) -> Iterator[tuple[Recorded, int, bytes]]:
+        """Yield every message undecoded: (topic, receive time [ns], serialised message), in the order of `times`.
 
         Args:
             topics: The topics wanted; all when empty.
 
+            as_written: Give the receive times that are in the files, for copies: those may go back.
         Raises:
             BagError: No such topic, or damaged data.
         """
         chosen = [pair for topic in topics or self.topics for pair in self._connections(topic)]
         streams = [self._undecoded(file, [c for other, c in chosen if other is file]) for file in self._files]
-        yield from merge(*streams, key=lambda item: item[1])
+        for source, time, written, raw in merge(*streams, key=lambda item: item[1]):
+            yield source, written if as_written else time, raw
 
     def types(self, recorded: Recorded) -> Types:
         """Give the message types of a topic, as rosbags parses them: (constants, fields) by ``package/msg/Name``."""
@@ -369,7 +371,7 @@ class Bags:
     def _states_of(self, file: BagFile, id_: int) -> States:
         return States.of(self._pieces(file, file.connections[id_], list(STATE_COLUMNS)))
 
-    def _undecoded(self, file: BagFile, connections: list[Connection]) -> Iterator[tuple[Recorded, int, bytes]]:
+    def _undecoded(self, file: BagFile, connections: list[Connection]) -> Iterator[tuple[Recorded, int, int, bytes]]:
         known = {c.id: Recorded(*c[1:]) for c in connections}
         try:
             for id_, time, raw in file.by_time(known):
@@ -383,7 +385,7 @@ class Bags:
         _, store = self._definition(connection)
         name = _type_name(connection.msgtype)
         try:
-            for _, time, raw in file.by_time([connection.id], spans):
+            for _, time, _, raw in file.by_time([connection.id], spans):
                 message = store.deserialize_ros1(raw, name)
                 self._restarts.message(time, message)
                 yield time, message

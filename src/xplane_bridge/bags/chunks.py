@@ -107,6 +107,7 @@ class BagFile:
         self._chunks: List[Chunk] = []
         self._entries: Dict[int, _Entries] = {}
         self._kept: Dict[int, bytes] = {}
+        self._moves: List[Tuple[int, int]] = []
         self._file: BinaryIO = path.open("rb")
         try:
             self._open()
@@ -127,8 +128,7 @@ class BagFile:
     def places(self, id_: int) -> np.ndarray:
         """Where a connection's messages lie, int64, in the order of `times`: what was written later lies higher."""
         _, chunk, offset = self._index[id_]
-        places: np.ndarray = chunk.astype(np.int64) << 32 | offset
-        return places
+        return _places(chunk, offset)
 
     def move(self, after: int, until: int, middle: int, by: int) -> None:
         """Moves the receive times [ns] of what lies behind the place where the recorder's clock went back.
@@ -146,6 +146,7 @@ class BagFile:
             begin = min(begin, int(behind.min())) if len(behind) else begin
         for id_, index in self._index.items():
             index.time[self.places(id_) >= begin] += by
+        self._moves.append((begin, by))
 
     def by_chunk(self, id_: int) -> Iterator[Tuple[np.ndarray, List[bytes]]]:
         """Messages of one connection, a chunk at a time: receive times, and the messages as they were serialised.
@@ -161,8 +162,8 @@ class BagFile:
 
     def by_time(
         self, ids: Collection[int], spans: Optional[Sequence[Tuple[int, int]]] = None
-    ) -> Iterator[Tuple[int, int, bytes]]:
-        """Messages of several connections in order of time: connection, receive time [ns], serialised message.
+    ) -> Iterator[Tuple[int, int, int, bytes]]:
+        """Messages of several connections in order of time: connection, receive time [ns], that in the file, message.
 
         Args:
             ids: The connections.
@@ -175,8 +176,10 @@ class BagFile:
         if spans is not None:
             chosen = [(id_, _within(index, spans)) for id_, index in chosen]
         for time, chunk, offset, owner in self._in_order(chosen):
+            written = time - sum(by * (_places(chunk, offset) >= begin) for begin, by in self._moves)
             for k in np.lexsort((offset, chunk, time)):
-                yield int(owner[k]), int(time[k]), _message(self._data(int(chunk[k])), int(offset[k]))
+                message = _message(self._data(int(chunk[k])), int(offset[k]))
+                yield int(owner[k]), int(time[k]), int(written[k]), message
 
     def _in_order(self, chosen: List[Tuple[int, _Index]]) -> Iterator[Tuple[np.ndarray, ...]]:
         """Entries of several connections, some at a time: none is earlier than those that were given before.
@@ -357,6 +360,11 @@ class BagFile:
         if len(data) != count:
             raise DamagedError("it ends in the middle of a record")
         return data
+
+
+def _places(chunk: np.ndarray, offset: np.ndarray) -> np.ndarray:
+    places: np.ndarray = chunk.astype(np.int64) << 32 | offset
+    return places
 
 
 def _within(index: _Index, spans: Sequence[Tuple[int, int]]) -> _Index:

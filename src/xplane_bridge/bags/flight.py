@@ -142,7 +142,9 @@ def read_flight(bags: Bags, store: Optional[ColumnFile] = None) -> Flight:
 def state_epochs(bags: Bags, state: Table) -> np.ndarray:
     """Count anew the epochs of flight states that are sorted by stamp: a part of one epoch has one time that goes on.
 
-    What a clock that was set back has laid among each other has an epoch of its own, each state; the log says so.
+    What a clock that was set back has laid among each other has an epoch of its own, each state; the log says so. It is
+    found in a recording that does not show the order in which states came, as `rosbag compress` writes it; elsewhere
+    time goes on over the step (`bags.restarts`).
 
     Args:
         bags: From which the states were read.

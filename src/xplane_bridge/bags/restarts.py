@@ -1,8 +1,14 @@
-"""Recordings over a restart of X-Plane or of rx_node: stamps and epochs that begin anew are made to go on.
+"""Recordings over a clock that goes back, or over a restart of rx_node: time and epochs are made to go on.
 
 With `publish_clock` a stamp is X-Plane's running time, which begins anew with X-Plane. Stamps of two flights would lie
 among each other, and so would receive times of a recorder that goes by the simulator's time. Both are moved as they are
 read, so that whatever sorts or joins by them has one time that only goes on.
+
+A host's clock that is set back does the same within one flight. It was that clock where stamps or receive times of
+flight states fall, in the order in which they were recorded, while simulated time and the count of frames go on: behind
+a restart of X-Plane both begin anew. Time goes on by the simulated time between the two states. A recorder's times fall
+at once and rx_node's stamps up to a second later, each is moved from there on; stamps of nodes that follow the clock
+sooner or later than rx_node are off by the step for that second.
 
 An rx_node counts its epochs from 0. Where it was started anew in a recording, those that it counts are raised as they
 are read, so that an epoch and a simulator time are of one frame.
@@ -21,30 +27,37 @@ from xplane_bridge.bags.chunks import BagFile
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP
 
 _LOG = logging.getLogger(__name__)
-#: A clock that goes back by less was set, or messages overtook each other: they are sorted.
+#: Where frames do not go on, by less only messages that overtook each other go back: they are sorted.
 _FALL_NS = 10**9
-#: Stamps that are so close to the time of receipt cannot have gone back unless that did.
+#: Stamps that are so close to the time of receipt cannot have begun anew unless that did.
 _NEAR_NS = _FALL_NS // 2
 #: Between what was received before and after a restart, where the recorder's clock does not say how long it took.
 _PAUSE_NS = 10**9
 #: Without states for longer, rx_node may have been started anew.
 _INTERRUPTED_NS = round(DEFAULT_MAX_GAP * 1e9)
-#: What `States` are made of beside the time of receipt, in their order.
+#: What `States` are made of beside the time of receipt, in their order; simulated time as received, since the unwrapped
+#: one may go back by a rounding error where the epoch is raised.
 STATE_COLUMNS = {
     "header.stamp": np.int64,
     "epoch": np.uint32,
-    "sim_time_unwrapped": np.float64,
+    "sim_time": np.float64,
     "frame_count": np.uint32,
 }
+#: Why stamps go back.
+_RESTARTED = "stamps go back where X-Plane was restarted; what was recorded behind that is read with stamps %s s later"
+_SET_BACK = (
+    "the host's clock was set back in flight; what was recorded behind that is read with stamps %s s later; let the "
+    "clock be slewed, not stepped, while flights are recorded"
+)
 
 
 class States(NamedTuple):
-    """What shows a restart, of flight states as recorded; each of shape (n,)."""
+    """What shows a restart or a clock set back, of flight states as recorded; each of shape (n,)."""
 
     time: np.ndarray  #: int64 [ns] of receipt
     stamp: np.ndarray  #: int64 [ns]
     epoch: np.ndarray
-    sim_time: np.ndarray  #: [s] unwrapped
+    sim_time: np.ndarray  #: [s]
     frame: np.ndarray  #: their number since the link came up
 
     @classmethod
@@ -71,9 +84,22 @@ class States(NamedTuple):
 
     def counted_anew(self) -> np.ndarray:
         """Give for each but the first whether rx_node was started anew before it, and counts epochs from 0 again."""
-        fallen = [column[1:] < column[:-1] for column in (self.epoch, self.sim_time, self.frame)]
-        anew: np.ndarray = np.any(fallen, axis=0) & ~self.raised()
+        anew: np.ndarray = (~self.goes_on() | (self.epoch[1:] < self.epoch[:-1])) & ~self.raised()
         return anew
+
+    def goes_on(self) -> np.ndarray:
+        """Give for each but the first whether X-Plane and rx_node went on from the one before it."""
+        fallen: np.ndarray = (self.sim_time[1:] < self.sim_time[:-1]) | (self.frame[1:] < self.frame[:-1])
+        return ~fallen
+
+    def set_back(self, time: np.ndarray) -> np.ndarray:
+        """Give the rows at which the host's clock, read at these times [ns], was set back."""
+        return np.flatnonzero((np.diff(time) < 0) & self.goes_on()) + 1
+
+    def simulated(self, rows: np.ndarray) -> np.ndarray:
+        """Give the simulated time [ns] since the state before each of these rows."""
+        passed: np.ndarray = np.rint((self.sim_time[rows] - self.sim_time[rows - 1]) * 1e9).astype(np.int64)
+        return passed
 
 
 class _Found(NamedTuple):
@@ -88,10 +114,10 @@ class _Found(NamedTuple):
 
 
 class Restarts:
-    """Makes the stamps and the epochs of a flight's messages go on as their receive times do.
+    """Makes the receive times, stamps and epochs of a flight's messages go on.
 
     Args:
-        path: A bag of the flight, for the warning.
+        path: A bag of the flight, for the warnings.
         connections: Gives those of the flight state: file, number of the connection.
         states: Gives the states of one, in the order of the file.
     """
@@ -107,12 +133,13 @@ class Restarts:
         self._states = states
         self._found: Optional[Tuple[_Found, _Found]] = None
         self._interrupted: Optional[bool] = None
+        self._moved = False
 
     def let_receive_times_go_on(self, files: Sequence[BagFile]) -> None:
         """Move the receive times of all messages that were recorded after the recorder's clock went back.
 
-        It did where those of the flight states go back, in the order in which they were written, and their epoch is
-        raised or, in one file, counted anew: receive times of files in disorder go back, too.
+        It did where those of the flight states go back, in the order in which they were written, and frames go on, or
+        their epoch is raised or, in one file, counted anew: receive times of files in disorder go back, too.
 
         Args:
             files: In the order in which they were recorded.
@@ -128,22 +155,25 @@ class Restarts:
         number, place, time = (np.concatenate(columns) for columns in (numbers, places, times))
         order = np.lexsort((place, number))
         number, place, time = number[order], place[order], time[order]
-        new = falls(time)
-        if not len(new):
+        if (np.diff(time) >= 0).all():
             return
         states = self._recorded().rows(order)
+        set_back, fallen = states.set_back(time), falls(time)
         restarted = states.raised() | (states.counted_anew() & (np.diff(number) == 0))
-        for k in new[restarted[new - 1]][::-1].tolist():  # from the last: each moves all that follows
+        passed = dict.fromkeys(fallen[restarted[fallen - 1]].tolist(), _PAUSE_NS)
+        passed.update(zip(set_back.tolist(), states.simulated(set_back).tolist()))
+        for k in sorted(passed, reverse=True):  # from the last: each moves all that follows
             first = place[k - 1] if number[k - 1] == number[k] else -1
-            step = int(time[k - 1] - time[k]) + _PAUSE_NS
+            step = int(time[k - 1] - time[k]) + passed[k]
             files[number[k]].move(int(first), int(place[k]), int(time[k - 1] // 2 + time[k] // 2), step)
             for file in files[number[k] + 1 :]:
                 file.move(-1, -1, 0, step)
+        self._moved = bool(passed)
 
     def columns(self, time: np.ndarray, found: Dict[str, np.ndarray]) -> Dict[str, np.ndarray]:
         """Give columns of messages received at these times [ns]; the stamps of headers are moved where they must be."""
         names = [name for name in found if name == "header.stamp" or name.endswith(".header.stamp")]
-        if all((np.abs(time - found[name]) < _NEAR_NS).all() for name in names):
+        if not self._moved and all((np.abs(time - found[name]) < _NEAR_NS).all() for name in names):
             return found
         by = self._read()[0].at(time)
         return {**found, **{name: np.where(found[name] == 0, 0, found[name] + by) for name in names}}
@@ -188,12 +218,16 @@ class Restarts:
 
     def _stamps(self, states: States) -> _Found:
         time, stamp = states.time, states.stamp
-        new = falls(stamp)
-        passed = time[new] - time[new - 1]
+        set_back = states.set_back(stamp)
+        new = np.union1d(falls(stamp), set_back)
+        by_clock = np.isin(new, set_back)
+        received = time[new] - time[new - 1]
+        passed = np.where(by_clock, states.simulated(new), received)
         by = np.append(0, np.cumsum(stamp[new - 1] - stamp[new] + passed))
-        if len(new):
-            _say(self._path, tuple((by[1:] / 1e9).tolist()))
-        return _Found(time[new - 1] + passed // 2, by)
+        for why, rows in ((_RESTARTED, ~by_clock), (_SET_BACK, by_clock)):
+            if rows.any():
+                _say(self._path, why, tuple((by[1:][rows] / 1e9).tolist()))
+        return _Found(time[new - 1] + received // 2, by)
 
 
 def _epochs(states: States) -> _Found:
@@ -207,13 +241,9 @@ def _epochs(states: States) -> _Found:
 
 
 @functools.lru_cache(maxsize=None)
-def _say(path: Path, by: Tuple[float, ...]) -> None:
+def _say(path: Path, why: str, by: Tuple[float, ...]) -> None:
     """Once for a flight, on stderr unless the program has set up logging."""
-    _LOG.warning(
-        "%s: stamps go back where X-Plane was restarted; what was recorded behind that is read with stamps %s s later",
-        path,
-        ", ".join(f"{seconds:.3f}" for seconds in by),
-    )
+    _LOG.warning(f"%s: {why}", path, ", ".join(f"{seconds:.3f}" for seconds in by))
 
 
 def falls(time: np.ndarray) -> np.ndarray:

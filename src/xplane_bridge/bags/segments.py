@@ -31,27 +31,23 @@ def segments(time: np.ndarray, epoch: Optional[np.ndarray] = None, max_gap: floa
     cut = (step > longest) | (step < 0)
     if epoch is not None:
         cut |= np.diff(epoch.astype(np.int64)) != 0
-    return _slices(cut)
+    edges = [0, *(np.flatnonzero(cut) + 1).tolist(), len(cut) + 1]
+    return [slice(a, b) for a, b in zip(edges[:-1], edges[1:])]
 
 
 def disordered(epoch: np.ndarray, sim_time: np.ndarray) -> np.ndarray:
     """Find the samples that lie among others of another time: the host's clock, by which they are sorted, was set back.
 
     Args:
-        epoch: Counter of shape (n,) that changes where `sim_time` may begin anew.
+        epoch: Counter of shape (n,) that only rises, where `sim_time` may begin anew or the clock was set back.
         sim_time: [s] simulated time, which otherwise goes on or stands still.
 
     Returns:
-        Whether a sample of the same epoch lies before it and is later, or behind it and is earlier.
+        Whether a sample lies before it and is later, or behind it and is earlier.
     """
-    out = np.zeros(len(epoch), dtype=bool)
-    for part in _slices(np.diff(epoch.astype(np.int64)) != 0):
-        own = sim_time[part]
-        out[part] = (own < np.fmax.accumulate(own)) | (own > np.fmin.accumulate(own[::-1])[::-1])
+    order = np.lexsort((sim_time, epoch))
+    later = (np.diff(epoch[order].astype(np.int64)) != 0) | (np.diff(sim_time[order]) != 0.0)
+    rank = np.zeros(len(epoch), dtype=np.int64)
+    rank[order[1:]] = np.cumsum(later)
+    out: np.ndarray = (rank < np.maximum.accumulate(rank)) | (rank > np.minimum.accumulate(rank[::-1])[::-1])
     return out
-
-
-def _slices(cut: np.ndarray) -> list[slice]:
-    """Give the samples between cuts; `cut` says of each but the first whether there is one before it."""
-    edges = [0, *(np.flatnonzero(cut) + 1).tolist(), len(cut) + 1]
-    return [slice(a, b) for a, b in zip(edges[:-1], edges[1:])]

@@ -48,7 +48,7 @@ def write_mcap(bags: Bags, path: Path, only: Sequence[str] = ()) -> Counts:
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start(profile="ros1", library=f"xplane_bridge {__version__}")
-        for source, time, raw in bags.recorded(full_names(bags, only)):
+        for source, time, raw in bags.recorded(full_names(bags, only), as_written=True):
             if source not in channels:
                 schema = (source.msgtype, source.definition)
                 if schema not in schemas:
@@ -87,7 +87,7 @@ def write_ros2(bags: Bags, path: Path, only: Sequence[str] = ()) -> Counts:
     connections: dict[tuple[str, str], Any] = {}
     messages = 0
     with _ros2_writer(path) as writer:
-        for source, time, raw in bags.recorded(full_names(bags, only)):
+        for source, time, raw in bags.recorded(full_names(bags, only), as_written=True):
             if source not in writing:
                 msgtype = source.msgtype.replace("/", "/msg/")
                 name = _RENAMED.get(msgtype, msgtype)

@@ -35,20 +35,24 @@ def test_slow_samples_are_one_segment_and_their_gaps_still_cut() -> None:
     assert segments(ns(5)) == [slice(0, 1)]
 
 
-def test_samples_among_those_of_another_time_are_found_within_an_epoch() -> None:
-    # The clock is set back between 5 and 6, by two samples and a half; nothing is behind the begin of an epoch.
+def test_samples_among_those_of_another_time_are_found() -> None:
+    # The clock is set back between 6 and 4, by two samples and a half; nothing is behind the begin of an epoch.
     sim_time = np.array([1.0, 2.0, 3.0, 6.0, 4.0, 7.0, 5.0, 8.0, 9.0, 9.0, 0.0, 1.0])
     epoch = np.array([1] * 10 + [2] * 2, dtype=np.uint32)
     assert disordered(epoch, sim_time).tolist() == [False] * 3 + [True] * 4 + [False] * 5
     assert disordered(epoch[:0], sim_time[:0]).tolist() == []
+    raised = epoch + np.isin(sim_time, (6.0, 7.0, 8.0, 9.0)) + (epoch == 2)
+    assert disordered(raised, sim_time).tolist() == [False] * 3 + [True] * 4 + [False] * 5
 
 
-def test_a_clock_set_back_in_flight_is_said_and_cut(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_clock_set_back_is_said_and_cut_where_the_order_was_lost(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     path = tmp_path / "f.bag"
-    record_a_clock_set_back(path)
+    record_a_clock_set_back(path, order_lost=True)
     with caplog.at_level(logging.WARNING), Bags(path) as bags:
         flight = read_flight(bags)
-    # Of the first flown second the last quarter lies among the second's first.
-    mixed = [slice(k, k + 1) for k in range(38, 62)]
-    assert flight.parts == [slice(0, 38), *mixed, slice(62, 100)]
+    # The last quarter of a second before the stamps went back lies among the first one behind.
+    mixed = [slice(k, k + 1) for k in range(54, 78)]
+    assert flight.parts == [slice(0, 54), *mixed, slice(78, 100)]
     assert "the host's clock was set back in flight: by their stamps 24 flight states" in caplog.text

@@ -106,9 +106,9 @@ def test_simulator_time_is_never_interpolated_across_a_gap(tmp_path: Path) -> No
 
 def test_simulator_time_is_none_between_two_times_of_a_clock_set_back(tmp_path: Path) -> None:
     paths = [tmp_path / "states.bag", tmp_path / "labels.bag"]
-    record_a_clock_set_back(paths[0])
+    record_a_clock_set_back(paths[0], order_lost=True)
     with FlightBag(paths[1]) as bag:
-        for t in (0.503, 0.883, 1.503):  # the states' stamps from 0.75 to 0.98 s are of two times
+        for t in (0.503, 1.183, 1.503):  # the states' stamps from 1.07 to 1.30 s are of two times
             bag.add("/xplane/scenario/label", "std_msgs/String", stamp_ns(t), {"data": ""})
     with Bags(paths) as bags:
         (label,) = arrays.topic_arrays(bags, ["scenario/label"])

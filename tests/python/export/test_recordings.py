@@ -12,7 +12,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from support.flights.export_flight import export, picture, write_flight
-from support.flights.synthetic_flight import FlightBag, stamp_ns, state_at
+from support.flights.synthetic_flight import FlightBag, record_a_clock_set_back, stamp_ns, state_at
 from xplane_bridge.bags import Bags
 
 OLD_BAG = Path(__file__).resolve().parents[3] / "tests/data/bags/every_topic_0.1.0.bag"
@@ -133,6 +133,21 @@ def test_topics_choose_and_split_bags_come_in_order(tmp_path: Path, form: str) -
     assert {topic for topic, _ in found} == {"/xplane/odom", "/xplane/control/mode"}
     assert len(found) == 2 * (50 + 3)
     assert [time for _, time in found] == sorted(time for _, time in found)
+
+
+@pytest.mark.parametrize("form", ["mcap", "ros2"])
+def test_times_over_a_clock_set_back_are_those_of_the_file(tmp_path: Path, form: str) -> None:
+    if form == "mcap":
+        reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")
+    record_a_clock_set_back(tmp_path / "flight.bag", step=6.0)
+    assert export(tmp_path / "flight.bag", "--format", form, "-o", tmp_path) == 0
+    if form == "mcap":
+        with (tmp_path / "flight.mcap").open("rb") as file:
+            found = [m.log_time for *_, m in reader.make_reader(file).iter_messages(log_time_order=False)]
+    else:
+        with sqlite3.connect(str(tmp_path / "flight.ros2" / "flight.ros2.db3")) as database:
+            found = [time for (time,) in database.execute("SELECT timestamp FROM messages ORDER BY id")]
+    assert found == [stamp_ns(k / 50 - (6.0 if k >= 50 else 0.0)) for k in range(100)], "in the order of recording"
 
 
 def test_a_topic_with_two_definitions_does_not_become_one_in_ros2(

@@ -89,10 +89,10 @@ def test_a_time_base_does_not_bridge_what_began_anew(tmp_path: Path, form: str, 
 
 def test_a_time_base_lies_on_no_line_between_two_times_of_a_clock_set_back(tmp_path: Path) -> None:
     paths = [tmp_path / "states.bag", tmp_path / "odometry.bag"]
-    record_a_clock_set_back(paths[0])
+    record_a_clock_set_back(paths[0], order_lost=True)
     with FlightBag(paths[1]) as bag:
         for k in range(100):
-            add_odometry(bag, "/xplane/odom", k / 50 - (0.25 if k >= 50 else 0.0), 0.0 if k < 50 else 5000.0)
+            add_odometry(bag, "/xplane/odom", k / 50 - (0.25 if k >= 66 else 0.0), 0.0 if k < 66 else 5000.0)
     with Bags(paths) as bags:
         _, position, _ = trajectory(bags, 200.0)
     assert set(position[:, 0]) == {0.0, 5000.0}

@@ -134,13 +134,24 @@ def state_at(t: float) -> dict[str, float]:
     }
 
 
-def record_a_clock_set_back(path: Path) -> None:
-    """Record two seconds of states at 50 Hz; after the first, the host's clock is set back by a quarter of a second."""
+def record_a_clock_set_back(path: Path, step: float = 0.25, order_lost: bool = False) -> None:
+    """Record two seconds of states at 50 Hz; after the first, the host's clock is set back.
+
+    Receive times go back at once, stamps when rx_node has read the clock 32 times, at two datagrams a frame: then it
+    raises the epoch.
+
+    Args:
+        path: The bag to write.
+        step: By how much it is set back [s].
+        order_lost: Whether messages lie by their receive times, as `rosbag compress` writes them.
+    """
+    received = [(stamp_ns(k / 50 - (step if k >= 50 else 0.0)), k) for k in range(100)]
     with FlightBag(path) as bag:
-        for k in range(100):
-            stamp = stamp_ns(k / 50 - (0.25 if k >= 50 else 0.0))
-            state = {**bag.state(k / 50, k), "header": bag.header(stamp, "base_link_frd")}
-            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp, state)
+        for receive, k in sorted(received) if order_lost else received:
+            followed = k >= 66
+            header = bag.header(stamp_ns(k / 50 - (step if followed else 0.0)), "base_link_frd")
+            state = {**bag.state(k / 50, k), "header": header, "epoch": 1 + followed}
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", receive, state)
 
 
 class FlightBag:
