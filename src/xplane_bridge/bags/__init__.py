@@ -1,6 +1,7 @@
 """Reads ROS 1 bags: topics into numpy columns, images one at a time. Needs rosbags, not ROS; nothing else reads bags.
 
-A recording that was cut off (a full disk, kill -9) is read to its last whole chunk, and a warning says so.
+A recording that was cut off (a full disk, kill -9) is read to its last whole chunk, and a warning says so; so is
+``NAME.bag.active`` in a folder, where there is no ``NAME.bag``.
 
 Messages are decoded with the definitions that the bag itself carries, so bags recorded with older versions of the
 messages read as they were; fields that came later are there too: NaN, 0, false or empty. Messages of one serialised
@@ -22,7 +23,6 @@ from __future__ import annotations
 
 import functools
 import logging
-import re
 import struct
 from dataclasses import dataclass
 from heapq import merge
@@ -43,6 +43,7 @@ from xplane_bridge.bags.decoding import (
     decode_objects,
     wanted,
 )
+from xplane_bridge.bags.files import bags_in, part_order, recording_of
 from xplane_bridge.bags.restarts import STATE_COLUMNS, Restarts, States
 from xplane_bridge.bags.units import Unit, later_units, parse_units
 from xplane_bridge.errors import XplaneBridgeError
@@ -54,20 +55,6 @@ _LOG = logging.getLogger(__name__)
 #: Messages are decoded so many at a time: bytes, and number of them.
 _PIECE_BYTES = 4 << 20
 _PIECE_MESSAGES = 8192
-#: Ends the name of each part of a split recording.
-_PART = re.compile(r"_[0-9]+$")
-
-
-def bags_in(folder: Path, pattern: str = "*.bag") -> list[Path]:
-    """The bags of a folder, by name; not what ``rosbag reindex`` keeps of each: ``NAME.orig.bag`` is the same flight.
-
-    Args:
-        folder: Where to look.
-        pattern: ``**/*.bag`` also looks in the folders in it.
-    """
-    found = sorted(folder.glob(pattern))
-    kept = {path.with_suffix(".orig.bag") for path in found}
-    return [path for path in found if path not in kept]
 
 
 class BagError(XplaneBridgeError):
@@ -159,7 +146,7 @@ class Bags:
         self.paths: list[Path] = []
         for item in (Path(p) for p in given):
             if item.is_dir():
-                found = sorted(bags_in(item), key=_part)
+                found = sorted(bags_in(item), key=part_order)
                 if not found:
                     msg = f"{item}: a directory without any .bag file"
                     raise BagError(msg)
@@ -169,8 +156,8 @@ class Bags:
         if not self.paths:
             msg = "no bag given: name at least one .bag file"
             raise BagError(msg)
-        if len({(path.parent, _PART.sub("", path.stem)) for path in self.paths}) == 1:
-            self.paths.sort(key=_part)  # a shell gives them in the order of texts
+        if len(set(map(recording_of, self.paths))) == 1:
+            self.paths.sort(key=part_order)  # a shell gives them in the order of texts
         self._open: Optional[list[BagFile]] = None
         self._restarts = Restarts(self.paths[0], self._states, self._states_of)
 
@@ -438,11 +425,6 @@ def _types_of(msgtype: str, definition: str) -> tuple[Types, Any]:
 def _rank(topic: str) -> tuple[int, str]:
     """By which topics of a type are ordered."""
     return topic.count("/"), topic
-
-
-def _part(path: Path) -> list[Union[str, int]]:
-    """By which the parts of a recording are ordered: NAME_2 before NAME_10."""
-    return [int(text) if k % 2 else text for k, text in enumerate(re.split("([0-9]+)", path.name))]
 
 
 def _type_name(msgtype: str) -> str:

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer
 
-from xplane_bridge.bags import BagError, Bags, bags_in
+from support.flights.cut_off import cut_off, without_index
+from xplane_bridge.bags import BagError, Bags
 from xplane_bridge.bags.columns import ColumnFile
+from xplane_bridge.bags.files import bags_in
 
 HEADER = "uint32 seq\ntime stamp\nstring frame_id\n"
 SEP = "=" * 80 + "\n"
@@ -318,12 +320,6 @@ def long_flight(path: Path, count: int = 3000) -> tuple[Path, list[int]]:
     return path, ends
 
 
-def without_index(raw: bytes) -> bytes:
-    """As a recorder leaves it that was killed: the place of the index is not written yet."""
-    at = raw.index(b"index_pos=") + len(b"index_pos=")
-    return raw[:at] + b"\0" * 8 + raw[at + 8 :]
-
-
 @pytest.mark.parametrize("beyond", [0, 5, 4000])
 def test_a_recording_that_was_cut_off_is_read_to_its_last_whole_chunk(tmp_path, caplog, beyond) -> None:
     path, ends = long_flight(tmp_path / "whole.bag")
@@ -396,3 +392,21 @@ def test_what_reindexing_has_kept_of_a_bag_is_no_other_bag(tmp_path: Path) -> No
         (tmp_path / name).touch()
     assert Bags(tmp_path).paths == [tmp_path / "alone.orig.bag", tmp_path / "b.bag"]
     assert bags_in(tmp_path, "**/*.bag") == [tmp_path / name for name in ("alone.orig.bag", "b.bag", "in/c.d.bag")]
+
+
+def test_the_last_part_of_a_recording_that_was_cut_off_is_read(tmp_path: Path) -> None:
+    parts = [flight(tmp_path / f"f_{number}.bag", 5, 5 * k) for k, number in enumerate((1, 2, 10))]
+    parts[2] = cut_off(parts[2])
+    cut_off(flight(tmp_path / "earlier.bag")).rename(tmp_path / "f_1.bag.active")  # of another, under that name
+    assert Bags(tmp_path).paths == Bags([parts[2], parts[0], parts[1]]).paths == parts
+    with Bags(tmp_path) as bags:
+        np.testing.assert_array_equal(bags.read("/s")["x"], np.arange(15) + 0.5)
+
+
+@pytest.mark.parametrize("size", [0, 20, 4200])
+def test_a_recording_that_was_cut_off_before_its_first_chunk_is_left_out(tmp_path: Path, caplog, size: int) -> None:
+    part, last = flight(tmp_path / "f_1.bag"), cut_off(flight(tmp_path / "f_2.bag"))
+    last.write_bytes(last.read_bytes()[:size])
+    assert Bags(tmp_path).paths == [part]
+    (record,) = caplog.records
+    assert record.getMessage().startswith(f"{last}: left out (")

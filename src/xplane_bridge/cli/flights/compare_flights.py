@@ -13,8 +13,9 @@ import yaml
 
 from xplane_bridge.analysis.comparison import SIGNALS, Matched
 from xplane_bridge.analysis.frames import frames_of
-from xplane_bridge.bags import Bags, bags_in
+from xplane_bridge.bags import Bags
 from xplane_bridge.bags.columns import ColumnFile
+from xplane_bridge.bags.files import bags_in
 from xplane_bridge.bags.flight import Flight, read_flight
 from xplane_bridge.bags.passport import Passport, read_passports
 from xplane_bridge.cli.entry import guarded

@@ -8,8 +8,9 @@ from typing import Dict, List, NamedTuple, Sequence, Tuple
 
 from xplane_bridge.bags import Bags
 
-#: PREFIX_DATE_NUMBER.bag, where PREFIX or DATE may be missing; each part has a date of its own.
-_NAME = re.compile(r"(?P<prefix>.*?)_?(?P<date>\d{4}(?:-\d\d){5})?_(?P<number>\d+)\.bag")
+#: PREFIX_DATE_NUMBER.bag, where PREFIX or DATE may be missing; each part has a date of its own. Of a recording that was
+#: cut off, the last part's name still ends in .active.
+_NAME = re.compile(r"(?P<prefix>.*?)_?(?P<date>\d{4}(?:-\d\d){5})?_(?P<number>\d+)\.bag(?:\.active)?")
 #: Between the last message of a part and the first one of the next [s]: far below what it takes to begin a recording
 #: anew with all nodes, and above what lies between two messages of `link_state` (1/s).
 _BETWEEN_S = 2.0

@@ -9,6 +9,7 @@ import subprocess
 
 import pytest
 
+from support.flights.cut_off import cut_off
 from support.flights.synthetic_flight import START, FlightBag, stamp_ns
 from xplane_bridge.cli.flights import compare_flights
 from xplane_bridge.cli.flights.compare_flights import matched, read
@@ -211,6 +212,9 @@ def test_folders_are_repetitions_and_give_intervals(tmp_path):
     [
         (["{a}"], "one flight alone"),
         (["{a}", "{none}"], "No such file"),
+    # So is what was cut off while its last part was recorded.
+    cut_off(after / names[-1])
+    assert page_of(before, after, tmp_path / "page.html").count("(12 parts)") == page.count("(12 parts)")
         (["{a}", "{empty}"], "a folder without any .bag file"),
         (["{a}", "{b}", "--event", "flutter"], "no event with 'flutter' in it; it has: aileron stuck"),
         (["{a}", "{b}", "--match", "scenario"], "give --match time or --event TEXT"),

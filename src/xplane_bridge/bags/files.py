@@ -1,0 +1,63 @@
+"""Which files of a folder are bags, and in which order the parts of a recording were written."""
+
+from __future__ import annotations
+
+import functools
+import logging
+import re
+from pathlib import Path
+from typing import Union
+
+from xplane_bridge.bags.chunks import BagFile, DamagedError
+
+_LOG = logging.getLogger(__name__)
+#: Follows the name of a bag while it is recorded, and stays where the recorder was killed.
+_ACTIVE = ".active"
+#: Ends the name of each part of a split recording.
+_PART = re.compile(r"_[0-9]+$")
+
+
+def bags_in(folder: Path, pattern: str = "*.bag") -> list[Path]:
+    """The bags of a folder, by name, also ``NAME.bag.active`` of a recording that was cut off.
+
+    Not what ``rosbag reindex`` keeps of each: ``NAME.orig.bag`` is the same flight. What was cut off before it held one
+    whole chunk is left out, and a warning says so.
+
+    Args:
+        folder: Where to look.
+        pattern: ``**/*.bag`` also looks in the folders in it.
+    """
+    found = set(folder.glob(pattern))
+    kept = {path.with_suffix(".orig.bag") for path in found}
+    cut_off = {path for path in folder.glob(pattern + _ACTIVE) if path.with_suffix("") not in found}
+    return sorted(found - kept | set(filter(_has_chunk, cut_off)))
+
+
+def recording_of(path: Path) -> tuple[Path, str]:
+    """What the parts NAME_0, NAME_1, ... of a recording have in common: folder and name."""
+    whole = path.with_suffix("") if path.suffix == _ACTIVE else path
+    return whole.parent, _PART.sub("", whole.stem)
+
+
+def part_order(path: Path) -> list[Union[str, int]]:
+    """By which the parts of a recording are ordered: NAME_2 before NAME_10."""
+    return [int(text) if k % 2 else text for k, text in enumerate(re.split("([0-9]+)", path.name))]
+
+
+def _has_chunk(path: Path) -> bool:
+    try:
+        BagFile(path).close()
+    except DamagedError as error:
+        _say_left_out(path, str(error))
+        return False
+    except OSError:
+        pass  # as of any other bag, the reason is said when it is opened
+    return True
+
+
+@functools.lru_cache(maxsize=None)
+def _say_left_out(path: Path, why: str) -> None:
+    """Once for a file, on stderr unless the program has set up logging."""
+    _LOG.warning(
+        "%s: left out (%s); the recording was cut off before its first whole chunk, or has just begun", path, why
+    )
