@@ -361,8 +361,8 @@ class Bags:
     def _undecoded(self, file: BagFile, connections: list[Connection]) -> Iterator[tuple[Recorded, int, int, bytes]]:
         known = {c.id: Recorded(*c[1:]) for c in connections}
         try:
-            for id_, time, raw in file.by_time(known):
-                yield known[id_], time, raw
+            for id_, time, written, raw in file.by_time(known):
+                yield known[id_], time, written, raw
         except (DamagedError, OSError) as error:
             raise _damaged(file, error) from None
 
