@@ -55,17 +55,15 @@ def write_report(
 
     Raises:
         BagError: The bags cannot be read.
-        LabelError: The labels cannot be read.
+        LabelError: The labels cannot be read, or are of another recording.
         PageError: `output` is a recording.
         ReportError: The file cannot be written; or it is, and shows no flight, because no flight state was recorded.
     """
     from xplane_bridge.bags.columns import ColumnFile
     from xplane_bridge.bags.flight import read_flight
-    from xplane_bridge.labels import table
+    from xplane_bridge.labels.recording import labels_of
     from xplane_bridge.plotting import report, static
     from xplane_bridge.plotting.page_file import refuse_recordings, write_page
-
-    known = table.read(labels) if labels else None
 
     def save(figure: Union[TimeFigure, PathFigure]) -> None:
         if png is not None:
@@ -73,6 +71,7 @@ def write_report(
 
     with Bags(list(bag_paths)) as bags:
         refuse_recordings(output, bags.paths)
+        known = labels_of(bags, labels) if labels else None
         try:
             for folder in (output.parent, png):
                 if folder is not None:

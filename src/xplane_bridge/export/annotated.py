@@ -212,7 +212,7 @@ def _lard_row(picture: Picture, thing: Thing, size: tuple[int, int], labels: Ima
     heading, pitch, roll = _attitude(picture)
     latitude, longitude, altitude = _place(picture)
     values: dict[str, Any] = {
-        "uuid": uuid.uuid5(uuid.NAMESPACE_OID, f"{picture.camera} {picture.stamp}"),
+        "uuid": uuid.uuid5(uuid.NAMESPACE_OID, f"{labels.about['recording']} {picture.camera} {picture.stamp}"),
         "image": picture.file,
         "width": size[0],
         "height": size[1],

@@ -90,25 +90,25 @@ def _euroc(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
 
 
 def _imagefolder(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
-    return export_images(bags, path, job.dataset, job.train_flight, _labels(job))
+    return export_images(bags, path, job.dataset, job.train_flight, _labels(bags, job))
 
 
-def _labels(job: Job) -> Optional[ImageLabels]:
+def _labels(bags: Bags, job: Job) -> Optional[ImageLabels]:
     from xplane_bridge.export.image_labels import ImageLabels
 
-    return ImageLabels(Path(job.labels)) if job.labels else None
+    return ImageLabels(bags, Path(job.labels)) if job.labels else None
 
 
 def _coco(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
     from xplane_bridge.export import annotated
 
-    return annotated.export_annotated(bags, path, job.dataset, job.train_flight, _labels(job), annotated.coco)
+    return annotated.export_annotated(bags, path, job.dataset, job.train_flight, _labels(bags, job), annotated.coco)
 
 
 def _yolo(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
     from xplane_bridge.export import annotated
 
-    labels = _labels(job)
+    labels = _labels(bags, job)
     # To a trainer, a picture without a file of labels shows nothing.
     return annotated.export_annotated(
         bags, path, job.dataset, job.train_flight, labels, annotated.yolo, only_labelled=True
@@ -118,7 +118,7 @@ def _yolo(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
 def _lard(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
     from xplane_bridge.export import annotated
 
-    return annotated.export_annotated(bags, path, job.dataset, job.train_flight, _labels(job), annotated.lard)
+    return annotated.export_annotated(bags, path, job.dataset, job.train_flight, _labels(bags, job), annotated.lard)
 
 
 def _npz(bags: Bags, path: Path, job: Job) -> dict[str, Any]:

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any, Iterable, Iterator, NamedTuple, Optional,
 import numpy as np
 
 from xplane_bridge.export.flight import ExportError
-from xplane_bridge.labels import table
+from xplane_bridge.labels.recording import labels_of
 
 if TYPE_CHECKING:
+    from xplane_bridge.bags import Bags
     from xplane_bridge.labels.table import Key
 
 #: Classes of objects, in the order of their numbers.
@@ -43,15 +44,16 @@ class ImageLabels:
     """The labels of one flight.
 
     Args:
+        bags: Open bags of the flight.
         path: A file of `label_images`.
 
     Raises:
-        LabelError: It cannot be used.
+        LabelError: It cannot be used, or is of another recording.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, bags: Bags, path: Path) -> None:
         self._path = path
-        self.about, self._frames = table.read(path)
+        self.about, self._frames = labels_of(bags, path)
 
     def counts(self, keys: Iterable[Key], others: int = 0) -> dict[str, Any]:
         """Count for the manifest what is labelled of these pictures.

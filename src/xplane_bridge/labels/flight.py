@@ -18,6 +18,7 @@ from xplane_bridge.labels import table as label_table
 from xplane_bridge.labels.apt import Airport
 from xplane_bridge.labels.camera import Camera, Optics, Pose
 from xplane_bridge.labels.heights import MEASURED_SIGMA_M, STANDING_M, STANDING_SIGMA_M, Ground, Profile, profile
+from xplane_bridge.labels.recording import identity
 from xplane_bridge.labels.table import LabelError
 from xplane_bridge.labels.things import MAP_SIGMA_M, SPAN_M, Labeller, Sun
 from xplane_bridge.labels.traffic import RecordedTraffic
@@ -241,7 +242,7 @@ def label_flight(
             remedy = "record with this version, from the whole of X-Plane's own window"
             msg = f"{bags.paths[0]}: no picture can be labelled ({reasons}); {remedy}"
             raise LabelError(msg)
-        return {**flight.about(), "left_out": dict(sorted(flight.left_out.items()))}
+        return {**flight.about(), "recording": identity(bags), "left_out": dict(sorted(flight.left_out.items()))}
 
     return label_table.write(path, about, flight.labels()), flight
 

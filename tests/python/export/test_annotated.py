@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from support.flights.drawn_approach import LEVER, scene, write_approach
+from support.flights.drawn_approach import BELLY, FORWARD, LEVER, scene, write_approach
 from support.flights.export_flight import export, write_flight
 from support.flights.synthetic_flight import stamp_ns
 from support.white_lines import airport_file
@@ -319,7 +319,14 @@ def test_labels_that_do_not_fit_are_refused(flight: Path, tmp_path: Path, capsys
     labels = table.beside(flight)
     for form in ("coco", "yolo"):
         assert export(other, "--format", form, "--labels", labels, "-o", tmp_path / "a") == 1
-        assert "labels none of these pictures: it is of flight.bag" in capsys.readouterr().err
+        assert "labels of another recording, made from flight.bag; expected those of" in capsys.readouterr().err
+    bags = tmp_path / "cameras.bag"
+    write_approach(bags, 1, views=(FORWARD, BELLY))
+    given = [str(bags), "--apt", str(airport_file()), "--airport", "XEMU", "--flat-world", "--camera", "belly"]
+    assert label_images.main(given) == 0
+    options = ("--labels", table.beside(bags), "--camera", "camera", "-o", tmp_path / "a")
+    assert export(bags, "--format", "coco", *options) == 1
+    assert "labels none of these pictures: it is of cameras.bag" in capsys.readouterr().err
     assert export(other, flight, "--format", "coco", "--labels", labels, "-o", tmp_path / "b") == 1
     assert "a file for 2 flights" in capsys.readouterr().err
     assert export(flight, other, "--format", "coco", "--labels", labels.parent, "-o", tmp_path / "b") == 1
@@ -327,6 +334,26 @@ def test_labels_that_do_not_fit_are_refused(flight: Path, tmp_path: Path, capsys
     with pytest.raises(SystemExit):
         export(flight, "--format", "csv", "--labels", labels, "-o", tmp_path / "c")
     assert "--labels is not for csv; it is for imagefolder, coco, yolo, lard" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_flight_with_the_same_stamps_is_another_one(
+    flight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], form: str
+) -> None:
+    other = write_approach(tmp_path / "flight.bag", FRAMES, far=300.0)  # as lock-step stamps it
+    labels = table.beside(flight)
+    assert export(other, "--format", form, "--labels", labels, "-o", tmp_path / "out") == 1
+    assert f"{labels}: labels of another recording, made from flight.bag" in capsys.readouterr().err
+    assert not (tmp_path / "out" / f"flight.{form}").exists()
+
+
+def test_lards_uuids_of_two_flights_with_the_same_stamps_differ(flight: Path, tmp_path: Path) -> None:
+    other = write_approach(tmp_path / "flight.bag", FRAMES, far=300.0)
+    assert label_images.main([str(other), "--apt", str(airport_file()), "--airport", "XEMU", "--flat-world"]) == 0
+    found = [labelled(bag, "lard", tmp_path / str(k)) for k, bag in enumerate((flight, other, flight))]
+    uuids = [set(pd.read_csv(folder / "train.csv", sep=";")["uuid"]) for folder in found]
+    assert not uuids[0] & uuids[1]
+    assert uuids[0] == uuids[2]
 
 
 def test_the_stamp_is_the_key(flight: Path) -> None:

@@ -151,7 +151,8 @@ def test_they_go_from_the_program_into_exports_and_overlay(tmp_path: Path, capsy
     arguments = ["--apt", str(airport_file()), "--airport", "XEMU", "--flat-world", "--span", "9"]
     assert label_images([str(bag), *arguments]) == 0
     assert "other aircraft: known in 16 of 16 pictures" in capsys.readouterr().out
-    labels = ImageLabels(tmp_path / "flight.labels.jsonl")
+    with Bags(bag) as bags:
+        labels = ImageLabels(bags, tmp_path / "flight.labels.jsonl")
     assert (labels.about["other_aircraft"], labels.about["others_unknown"], labels.about["span"]) == (True, 0, 9.0)
     keys = [("camera", stamp_ns(k * EVERY * PERIOD)) for k in range(PICTURES)]
     assert labels.counts(keys)["objects"]["aircraft"] >= 8

@@ -78,7 +78,9 @@ def test_labels_of_another_flight_and_none_at_all(tmp_path: Path, capsys: pytest
     assert label_images.main([str(bag), "--apt", str(airport_file()), "--airport", "XEMU"]) == 0
     other = write_flight(tmp_path / "other.bag", 1.0, offset=50.0)
     output = tmp_path / "report.html"
-    assert flight_report.main([str(other), "--labels", str(table.beside(bag)), "-o", str(output)]) == 0
-    assert "Not shown: the labels are of other pictures." in output.read_text(encoding="utf-8")
+    assert flight_report.main([str(other), "--labels", str(table.beside(bag)), "-o", str(output)]) == 1
+    said = f"labels of another recording, made from flight.bag; expected those of {other}, but "
+    assert f"{table.beside(bag)}: {said}" in capsys.readouterr().err
+    assert not output.exists()
     assert flight_report.main([str(bag), "--labels", str(tmp_path / "none.jsonl"), "-o", str(output)]) == 1
     assert "none.jsonl: No such file or directory; label_images writes it" in capsys.readouterr().err
