@@ -28,6 +28,8 @@ SIGNALS: dict[str, tuple[str, str, float, float]] = {
 _UNKNOWN = Interval(math.nan, math.nan)
 #: How often as long as its memory a block is.
 _MEMORIES = 5
+#: Times that differ by no more are one instant [s].
+_SAME_S = 1e-9
 #: Independent stretches that an interval needs.
 _FEWEST_BLOCKS = 6
 
@@ -40,6 +42,7 @@ class Matched:
         name: As the tables call it.
         variant: What it is a repetition of; flights of one variant are taken together.
         time: [s] since what the flights are matched by, shape (n,), increasing: each simulated frame once.
+            It stands at a reset: the last frame before that and the first one behind it have the same time.
         values: Samples by column of `SIGNALS`, in SI and degrees.
         parts: Segments of `time`: nothing is interpolated between them.
         scores: What the scenario's criteria have measured, by name.
@@ -108,18 +111,27 @@ def difference(reference: Matched, flight: Matched, column: str) -> tuple[np.nda
 def _at(time: np.ndarray, flight: Matched, column: str, period: float) -> np.ndarray:
     out = np.full(len(time), np.nan)
     values = np.asarray(flight.values[column], dtype=float)
+    rank, own_rank = _rank(time), _rank(flight.time)
     for part in flight.parts:
-        known = flight.time[part]
-        samples = values[part]
-        good = np.isfinite(samples)
-        if good.sum() < 2:
+        good = np.isfinite(values[part])
+        if not good.any():
             continue
-        known, samples = known[good], samples[good]
+        known, samples = flight.time[part][good], values[part][good]
         if period:
             samples = np.unwrap(samples * (2.0 * math.pi / period)) * (period / (2.0 * math.pi))
-        inside = (time >= known[0] - 1e-9) & (time <= known[-1] + 1e-9)
+        # A part that begins with a reset leaves the instant's earlier samples to the parts before it.
+        begun = (time > known[0] + _SAME_S) | ((time >= known[0] - _SAME_S) & (rank >= own_rank[part][good][0]))
+        inside = begun & (time <= known[-1] + _SAME_S)
         out[inside] = np.interp(time[inside], known, samples)
     return out
+
+
+def _rank(time: np.ndarray) -> np.ndarray:
+    """How many samples of the same instant are before each."""
+    number = np.arange(len(time))
+    begins = np.append(True, np.diff(time) > _SAME_S)[: len(time)]
+    rank: np.ndarray = number - np.maximum.accumulate(np.where(begins, number, 0))
+    return rank
 
 
 def mean_interval(samples: np.ndarray) -> Interval:

@@ -214,6 +214,20 @@ class Bags:
         """Give the receive times of a topic's messages, int64 [ns], sorted; read from the index, not from the data."""
         return np.sort(np.concatenate([file.times(c.id) for file, c in self._connections(topic)]))
 
+    def before_first(self, topic: str, other: str) -> np.ndarray:
+        """Give for each message of a topic, in receive order, whether it was written to its file before any of another.
+
+        So are the messages of latched topics that ``rosbag record --repeat-latched`` writes anew to each file.
+        """
+        places = [(file, file.places(c.id)) for file, c in self._connections(other)]
+        rows = []
+        for file, c in self._connections(topic):
+            firsts = [int(own.min()) for holder, own in places if holder is file and len(own)]
+            rows.append((file.times(c.id), file.places(c.id) < min(firsts, default=np.iinfo(np.int64).max)))
+        time, before = (np.concatenate(columns) for columns in zip(*rows))
+        ordered: np.ndarray = before[np.argsort(time, kind="stable")]
+        return ordered
+
     def topic_of_type(self, msgtype: str, suffix: str = "") -> Optional[str]:
         """Find the topic of a message type (``package/Name``) whose name ends in `suffix`.
 
@@ -306,8 +320,8 @@ class Bags:
 
         Args:
             topics: The topics wanted; all when empty.
-
             as_written: Give the receive times that are in the files, for copies: those may go back.
+
         Raises:
             BagError: No such topic, or damaged data.
         """

@@ -54,6 +54,31 @@ def test_nothing_is_interpolated_across_a_gap():
     assert delta == pytest.approx(0.0, abs=1e-9)
 
 
+def reset(at, heights=(100.0, 300.0, 700.0)):
+    """10 s at a height, then another one from each of these times [s] on, both at the instant."""
+    edges = [0.0, *at, 10.0]
+    times = [np.arange(a, b + 0.05, 0.1) for a, b in zip(edges[:-1], edges[1:])]
+    values = [np.full(len(time), height) for time, height in zip(times, heights)]
+    ends = np.cumsum([0, *map(len, times)]).tolist()
+    parts = [slice(a, b) for a, b in zip(ends[:-1], ends[1:])]
+    return Matched("f", "a", np.concatenate(times), {"altitude_msl": np.concatenate(values)}, parts)
+
+
+@pytest.mark.parametrize("at", [(3.0,), (3.0, 6.0), (3.0, 3.0)])
+def test_at_a_reset_what_was_before_is_compared_with_what_was_before(at):
+    time, delta = difference(reset(at), reset(at), "altitude_msl")
+    assert len(time) == 101 + len(at)
+    assert not delta.any()
+
+
+def test_where_one_flight_alone_is_reset_its_last_state_before_is_compared_too():
+    plain, other = reset(()), reset((3.0,))
+    for time, delta in (difference(plain, other, "altitude_msl"), difference(other, plain, "altitude_msl")):
+        assert (np.abs(delta[time < 2.95]) == 0.0).all()
+        assert (np.abs(delta[time > 3.05]) == 200.0).all()
+    assert np.abs(difference(plain, other, "altitude_msl")[1]).tolist() == [0.0] * 31 + [200.0] * 70
+
+
 def test_flights_without_common_time_have_no_difference():
     assert signal_differences(flight(), flight(shift=1000.0)) == []
 

@@ -38,7 +38,7 @@ class Read(NamedTuple):
     parts: int  #: files of the recording
     variant: str
     flight: Flight
-    labels: Dict[str, Set[int]]  #: receive times [ns] of the messages of each text on scenario/label
+    labels: Dict[str, Set[int]]  #: receive times [ns] at which scenario/label was set in the flight, by its text
     passport: Optional[Passport]
     played: Mapping[str, Any]  #: of the player's log beside the bag; empty: there is none
 
@@ -148,14 +148,10 @@ def read(paths: Sequence[Path], variant: str, store: Optional[ColumnFile] = None
         CompareError: It holds no flight, or what lies beside it is no log of a player.
     """
     path = paths[0]
-    labels: Dict[str, Set[int]] = {}
     with Bags(paths) as bags:
         flight = read_flight(bags, store)
         passports = read_passports(bags)
-    if "label" in flight.tables:
-        table = flight.tables["label"]
-        for time, label in zip(table.time, table["data"]):
-            labels.setdefault(str(label), set()).add(int(time))
+        labels = labels_set(bags, flight)
     if "state" not in flight.tables:
         raise CompareError(f"{path}: no flight state in it")
     played: Mapping[str, Any] = {}
@@ -169,7 +165,27 @@ def read(paths: Sequence[Path], variant: str, store: Optional[ColumnFile] = None
             raise CompareError(
                 f"{beside}: no log of a scenario's player; expected that of run_scenario, or none: move it away"
             )
-    return Read(path, len(paths), variant, flight, labels, passports[-1] if passports else None, played)
+    passport = passports[-1] if passports else None
+    return Read(path, len(paths), variant, flight, labels, passport, played)
+
+
+def labels_set(bags: Bags, flight: Flight) -> Dict[str, Set[int]]:
+    """Receive times [ns] at which scenario/label was set, by its text; none of a text that was set before the flight.
+
+    The label is latched: a recorder begins with the latest one, and rosbag writes it anew to each part.
+    """
+    times: Dict[str, Set[int]] = {}
+    if not {"label", "state"} <= set(flight.tables):
+        return times
+    table = flight.tables["label"]
+    repeated = bags.before_first(table.topic, flight.tables["state"].topic)
+    last: Optional[str] = None
+    for time, text, may_repeat in zip(table.time.tolist(), map(str, table["data"]), repeated.tolist()):
+        of_text = times.setdefault(text, set())
+        if not (may_repeat and last in (None, text)):
+            of_text.add(time)
+        last = text
+    return times
 
 
 def _is_log(played: Any) -> bool:
@@ -237,7 +253,7 @@ def event_time(each: Read, text: str) -> int:
     times = {said: set(stamps) for said, stamps in each.labels.items()}
     for event in each.flight.events:
         times.setdefault(event.text, set()).add(event.stamp)
-    # The list of events and the latest label are latched: those of earlier flights come with them.
+    # The list of events is latched: those of earlier flights come with it.
     begin, end = each.flight.start, each.flight.end
     inside = {said: [stamp for stamp in stamps if begin <= stamp <= end] for said, stamps in times.items()}
     fitting = [stamp for said, stamps in inside.items() if text.lower() in said.lower() for stamp in stamps]

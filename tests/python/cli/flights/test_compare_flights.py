@@ -12,7 +12,7 @@ import pytest
 from support.flights.cut_off import cut_off
 from support.flights.synthetic_flight import START, FlightBag, stamp_ns
 from xplane_bridge.cli.flights import compare_flights
-from xplane_bridge.cli.flights.compare_flights import matched, read
+from xplane_bridge.cli.flights.compare_flights import CompareError, matched, read
 
 SCENARIO = """
 name: weave
@@ -116,6 +116,45 @@ def test_a_label_counts_where_it_comes_again_in_the_flight(tmp_path):
     assert round(float(matched(read([path], ""), "x", "event", "turn").time[0]), 3) == -4.0
 
 
+def write_split(folder, labels):
+    """Two parts of 4 s, each with its labels (time [s] and text) written before its states."""
+    paths = [folder / f"flight_{part}.bag" for part in range(2)]
+    for part, path in enumerate(paths):
+        with FlightBag(path) as bag:
+            for t, text in labels[part]:
+                bag.add("/xplane/scenario/label", "std_msgs/String", stamp_ns(t), {"data": text})
+            for k in range(40 * part, 40 * (part + 1)):
+                bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / RATE), bag.state(k / RATE, k))
+    return paths
+
+
+def test_a_label_that_a_part_of_a_split_recording_repeats_is_no_event(tmp_path):
+    # rosbag writes it at the split, before messages that it has received earlier.
+    paths = write_split(tmp_path, ([(-0.05, "aileron stuck")], [(4.15, "aileron stuck")]))
+    with pytest.raises(CompareError, match="only before or after; it has: no event at all"):
+        matched(read(paths, ""), "x", "event", "aileron")
+
+
+def test_a_label_that_is_set_at_a_split_is_an_event(tmp_path):
+    # The first one is repeated, the second one was set while it still waited to be written.
+    paths = write_split(tmp_path, ([(-0.05, "turn")], [(4.15, "turn"), (4.2, "aileron stuck")]))
+    assert round(float(matched(read(paths, ""), "x", "event", "aileron").time[0]), 3) == -4.2
+
+
+def test_a_flight_with_a_reset_is_equal_to_itself(tmp_path):
+    path = tmp_path / "a.bag"
+    with FlightBag(path) as bag:
+        for k in range(100):
+            state = {**bag.state(k / RATE, k), "epoch": 1 + (k >= 40)}
+            state["sim_time_unwrapped"] -= 4.0 * (k >= 40)
+            state["altitude_msl"] += 500.0 * (k >= 40)
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / RATE), state)
+    again = shutil.copy(path, tmp_path / "b.bag")
+    page = page_of(path, again, tmp_path / "page.html")
+    for signal in ("altitude MSL", "true heading", "roll"):
+        assert "equal" in re.search(rf"<tr><td>{signal}</td>.*?</tr>", page).group(0)
+
+
 def test_a_frame_that_a_pause_repeats_counts_once(tmp_path):
     def fly(path, rate_deg_s, paused_for=0):
         host = 0.0
@@ -173,6 +212,9 @@ def test_the_parts_of_a_split_recording_are_one_flight(tmp_path, names):
     assert "0 to 59.9" in page
     row = re.search(r"<tr><td>altitude MSL</td>.*?</tr>", page).group(0)
     assert "<td class=n>3</td>" in row
+    # So is what was cut off while its last part was recorded.
+    cut_off(after / names[-1])
+    assert page_of(before, after, tmp_path / "page.html").count("(12 parts)") == page.count("(12 parts)")
     # So are parts that are named one by one, in whatever order.
     files = [path for folder in (before, after) for path in sorted(folder.iterdir())]
     assert page_of(*files, tmp_path / "page.html").count("(12 parts)") == page.count("(12 parts)")
@@ -212,9 +254,6 @@ def test_folders_are_repetitions_and_give_intervals(tmp_path):
     [
         (["{a}"], "one flight alone"),
         (["{a}", "{none}"], "No such file"),
-    # So is what was cut off while its last part was recorded.
-    cut_off(after / names[-1])
-    assert page_of(before, after, tmp_path / "page.html").count("(12 parts)") == page.count("(12 parts)")
         (["{a}", "{empty}"], "a folder without any .bag file"),
         (["{a}", "{b}", "--event", "flutter"], "no event with 'flutter' in it; it has: aileron stuck"),
         (["{a}", "{b}", "--match", "scenario"], "give --match time or --event TEXT"),
