@@ -125,6 +125,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     outcomes = campaign.export(jobs, run)
     bar = tqdm(outcomes, total=len(jobs), unit="flight", disable=not sys.stderr.isatty())
     for outcome in bar:
+        for warning in outcome.warnings:
+            bar.write(f"{outcome.name}: {warning}", file=sys.stderr)
         if outcome.record is None:
             failed += 1
             bar.write(f"{outcome.name}: {outcome.error}", file=sys.stderr)

@@ -12,12 +12,15 @@ from __future__ import annotations
 import errno
 import hashlib
 import json
+import logging
 import os
 import random
 import shutil
 import sqlite3
+import threading
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, NamedTuple, Optional, Sequence
 
@@ -44,6 +47,7 @@ class Outcome(NamedTuple):
     record: Optional[dict[str, Any]]  #: the flight's part of the manifest
     error: str  #: empty, or one line
     reused: bool  #: an earlier run had made it
+    warnings: tuple[str, ...] = ()  #: what there is to know about its recording, each a line
 
 
 def flights(arguments: Sequence[str]) -> dict[str, tuple[str, ...]]:
@@ -104,6 +108,32 @@ def choose_training(names: Iterable[str], options: Options) -> set[str]:
 
 def export_flight(job: Job) -> Outcome:
     """Export one flight; the one function that local processes and cluster workers run."""
+    with _warnings() as found:
+        outcome = _outcome(job)
+    return outcome._replace(warnings=tuple(dict.fromkeys(found)))
+
+
+@contextmanager
+def _warnings() -> Iterator[list[str]]:
+    """Collect the package's warnings: a worker may have no handler that prints them, or its own machine's stderr."""
+    found: list[str] = []
+    thread = threading.get_ident()  # a Dask worker may export several flights at once, each on its own thread
+
+    class Collector(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            if record.thread == thread:
+                found.append(record.getMessage())
+
+    collector = Collector(logging.WARNING)
+    package = logging.getLogger("xplane_bridge")
+    package.addHandler(collector)
+    try:
+        yield found
+    finally:
+        package.removeHandler(collector)
+
+
+def _outcome(job: Job) -> Outcome:
     output = Path(job.output)
     record_file = output / RECORDS / job.format / f"{job.name}.json"
     try:

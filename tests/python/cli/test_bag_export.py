@@ -5,6 +5,9 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import cv2
@@ -13,8 +16,12 @@ import pandas as pd
 import pytest
 
 from support.deadlines import PROGRAM_S
+from support.flights.cut_off import cut_off
 from support.flights.export_flight import RATE, export, files_of, picture, pictures_in, write_flight
 from support.flights.synthetic_flight import START, FlightBag, stamp_ns, state_at
+from xplane_bridge.export import campaign
+from xplane_bridge.export.formats import Job
+from xplane_bridge.export.pictures import Options
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet"])
@@ -227,6 +234,28 @@ def test_a_dask_cluster_gives_the_same_bytes(tmp_path: Path) -> None:
     local, dask = files_of(tmp_path / "local"), files_of(tmp_path / "dask")
     assert local == dask
     assert len(local) > 15
+
+
+@pytest.mark.parametrize(("jobs", "start"), [(1, "fork"), (2, "fork"), (2, "spawn")])
+def test_warnings_about_a_recording_are_said_once_wherever_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture, jobs: int, start: str
+) -> None:
+    pool = partial(ProcessPoolExecutor, mp_context=get_context(start))
+    monkeypatch.setattr(campaign, "ProcessPoolExecutor", pool)
+    bags = [cut_off(write_flight(tmp_path / f"f{k}.bag", 0.4)) for k in range(2)]
+    assert export(*bags, "-o", tmp_path / "o", "--jobs", str(jobs)) == 0
+    err = capfd.readouterr().err
+    for bag in bags:
+        assert err.count(f"{bag.name}: {bag}: the recording was cut off; read to its last whole chunk, ") == 1
+    assert err.count("cut off") == 2
+
+
+def test_a_worker_gives_the_warnings_of_its_flight(tmp_path: Path) -> None:
+    bag = cut_off(write_flight(tmp_path / "f.bag", 0.4))
+    job = Job("f", (str(bag),), str(tmp_path / "o"), "csv", None, (), Options(), True)
+    (warning,) = campaign.export_flight(job).warnings
+    assert warning.startswith(f"{bag}: the recording was cut off; ")
+    assert campaign.export_flight(job._replace(bags=(str(write_flight(tmp_path / "g.bag", 0.4)),))).warnings == ()
 
 
 @pytest.mark.parametrize(
