@@ -45,7 +45,7 @@ class Passport:
 
     def says_the_same(self, other: Passport) -> bool:
         """Whether both say the same."""
-        return self.lines() == other.lines() and self.parameters == other.parameters
+        return self.lines() == other.lines()
 
     def lines(self) -> dict[str, str]:
         """Give all that it says, each with its name: parameters as paths; the texts of files have several lines."""
@@ -109,7 +109,8 @@ def _passport(message: Any, topic: str) -> Passport:
     except ValueError as error:
         msg = f"{topic}: the parameters are no JSON: {error}"
         raise BagError(msg) from None
-    settings = {str(name): float(value) for name, value in zip(message.settings, message.setting_values)}
+    # By way of the text: of a float32 the shortest number that is it, 0.1 and not 0.10000000149011612.
+    settings = {str(name): float(str(value)) for name, value in zip(message.settings, message.setting_values)}
     others = {
         "package version": str(message.package_version),
         "commit": str(message.commit),
@@ -135,5 +136,11 @@ def _words(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return "not known" if value != value else f"{value:.7g}"
+        return "not known" if value != value else _exactly(value)
     return value if isinstance(value, str) else json.dumps(value)
+
+
+def _exactly(value: float) -> str:
+    """Numbers that differ have different texts: by them, flights are compared."""
+    short = f"{value:.7g}"
+    return short if float(short) == value else repr(value)

@@ -115,6 +115,16 @@ def test_texts_that_differ_never_look_alike():
     assert len(set(shortened(rows))) == len(rows)
 
 
+def test_numbers_that_differ_in_a_late_digit_differ_everywhere(tmp_path):
+    flights = [flown(tmp_path, origin=longitude) for longitude in (126.44071, 126.44074)]
+    assert changes(*flights) == ["experiment/origin: 126.44071 -> 126.44074"]
+    assert "126.44074" in differences_table(["a.bag", "b.bag"], flights)
+    (first,) = passports(tmp_path, {"setting_values": [1e6 + 0.1, 0.1]})
+    (second,) = passports(tmp_path, {"setting_values": [1e6 + 0.2, 0.1]})  # as float32: by 2 of its last digit
+    assert first.lines()["sim/time/use_system_time"] == "0.1"
+    assert changes(first, second) == ["sim/time/sim_speed: 1000000.1 -> 1000000.2"]
+
+
 def test_a_recording_without_one_says_so(tmp_path):
     assert passports(tmp_path) == []
     assert "no topic experiment" in passport_section([])
