@@ -185,7 +185,8 @@ def _figures(campaign: Campaign, table: pd.DataFrame) -> str:
         for name, label in _numeric(campaign):
             out.append(_scatter(drawn[f"parameter_{name}"].to_numpy(dtype=float), y, met, label, criterion.name))
     note = "" if every == 1 else f"<p class=note>Every {every}th flight is drawn.</p>"
-    note += "<p class=note>Red: the criterion is missed; on the lower edge: there is no value.</p>"
+    note += "<p class=note>Red: the criterion is missed; on the lower edge: there is no value; above the frame: "
+    note += "it never settles.</p>"
     return f"<div>{''.join(out)}</div>{note}"
 
 
@@ -239,9 +240,11 @@ def _scatter(x: np.ndarray, y: np.ndarray, met: np.ndarray, x_label: str, y_labe
     axes = _Axes(x, y, x_label, y_label)
     dots = []
     for across, value, good in zip(x, y, met):
-        if not math.isfinite(across) or math.isinf(value):
+        if not math.isfinite(across):
             continue
-        cx, cy = axes.place(across, axes.lowest if math.isnan(value) else value)
+        cx, cy = axes.place(across, value if math.isfinite(value) else axes.lowest)
+        if value == math.inf:
+            cy = _TOP / 2  # beyond every value, and not taken for the largest one
         dots.append(f'<circle class={"flown" if good else "missed"} cx="{cx:.1f}" cy="{cy:.1f}" r="2"/>')
     return _svg(axes.frame + "".join(dots))
 

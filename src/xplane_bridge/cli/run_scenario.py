@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import shlex
 import sys
 from pathlib import Path
@@ -170,6 +171,12 @@ def render(scores: Sequence[Score]) -> str:
     return "\n".join(lines)
 
 
+def _plain(score: Score) -> Dict[str, Any]:
+    """A criterion of scores.json: JSON has finite numbers only."""
+    value = score.value
+    return {**score._asdict(), "value": None if math.isnan(value) else "never" if math.isinf(value) else value}
+
+
 @guarded
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs the program."""
@@ -193,8 +200,9 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         )
     with Bags(plan.bag) as bags:
         scores = judge(scenario, read_flight(bags), played)
-    report = {"scenario": scenario.name, "played": played, "criteria": [s._asdict() for s in scores]}
-    (plan.output / "scores.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    report = {"scenario": scenario.name, "played": played, "criteria": [_plain(s) for s in scores]}
+    text = json.dumps(report, indent=2, allow_nan=False) + "\n"
+    (plan.output / "scores.json").write_text(text, encoding="utf-8")
     missed = [s.name for s in scores if not s.passed]
     print(render(scores) if scores else f"{scenario.name} has no criteria")
     print(f"{scenario.name}: {len(scores) - len(missed)} of {len(scores)} criteria met; the recording is {plan.bag}")

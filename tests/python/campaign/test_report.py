@@ -112,7 +112,9 @@ def test_the_page_needs_no_network_and_says_what_was_flown() -> None:
     # 1 of 6 passed; Wilson by hand: centre (1/6 + 0.3201) / 1.6402, half 0.5975 / 1.6402 * ...
     assert "<td>1 of 6</td><td>16.7%</td><td>3.0% .. 56.4%</td>" in text
     assert "5 flown, 1 no start" in text
-    assert text.count("<circle") == 4 + 5 + 2  # one value is infinite, one flight has none: on the lower edges
+    assert text.count("<circle") == 5 + 5 + 2  # one flight has no values: on the lower edges
+    assert re.findall(r'<circle class=(\w+) cx="[\d.]+" cy="4.0"', text) == ["missed"]  # the one that never settles
+    assert "above the frame: it never settles" in text
     assert text.count("<polyline") == 3
 
 

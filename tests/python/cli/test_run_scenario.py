@@ -8,6 +8,7 @@ from contextlib import nullcontext
 
 import pytest
 
+from xplane_bridge.analysis.scoring import Score
 from xplane_bridge.campaign.distributions import CampaignError
 from xplane_bridge.cli import run_scenario
 from xplane_bridge.cli.run_scenario import lockstep_of, parser, plan_of
@@ -55,15 +56,29 @@ def test_buttons_without_a_joystick_are_refused_before_anything_starts(tmp_path)
         play(Namespace(scenario=str(file)), [], "scenario_player", joystick=False)
 
 
-def test_what_was_carried_out_late_is_on_the_console(monkeypatch, tmp_path, capsys):
-    entry = {"action": "failure", "value": {"name": "engine_1"}, "time": 8.2, "late": 1.07}
-    played = json.dumps({"finished": True, "labels": {}, "late": [entry]})
+def stand_in_for_a_flight(monkeypatch, late=(), scores=()):
+    """Lets run_scenario find a flight that was flown to its end."""
+    played = json.dumps({"finished": True, "labels": {}, "late": late})
     monkeypatch.setattr(run_scenario, "fly", lambda plan, **_: (plan.output / "played.json").write_text(played))
     monkeypatch.setattr(run_scenario, "Bags", nullcontext)
     monkeypatch.setattr(run_scenario, "read_flight", lambda _: None)
-    monkeypatch.setattr(run_scenario, "judge", lambda *_: [])
+    monkeypatch.setattr(run_scenario, "judge", lambda *_: scores)
+
+
+def test_what_was_carried_out_late_is_on_the_console(monkeypatch, tmp_path, capsys):
+    entry = {"action": "failure", "value": {"name": "engine_1"}, "time": 8.2, "late": 1.07}
+    stand_in_for_a_flight(monkeypatch, late=[entry])
     assert run_scenario.main(["engine_failure", "--output", str(tmp_path)]) == 0
     assert "run_scenario: warning: failure of 8.2 s was carried out 1.1 s late\n" in capsys.readouterr().err
+
+
+def test_scores_are_strict_json(monkeypatch, tmp_path):
+    scores = [Score(str(value), "settling", value, False, "below 5") for value in (1.5, float("inf"), float("nan"))]
+    stand_in_for_a_flight(monkeypatch, scores=scores)
+    assert run_scenario.main(["engine_failure", "--output", str(tmp_path)]) == 1
+    text = (tmp_path / "scores.json").read_text(encoding="utf-8")
+    criteria = json.loads(text, parse_constant=pytest.fail)["criteria"]
+    assert {each["name"]: each["value"] for each in criteria} == {"1.5": 1.5, "inf": "never", "nan": None}
 
 
 def level(_state):
