@@ -43,7 +43,7 @@ from xplane_bridge.bags.decoding import (
     decode_objects,
     wanted,
 )
-from xplane_bridge.bags.files import bags_in, part_order, recording_of
+from xplane_bridge.bags.files import bags_in, ending, part_order, recording_of
 from xplane_bridge.bags.restarts import STATE_COLUMNS, Restarts, States
 from xplane_bridge.bags.units import Unit, later_units, parse_units
 from xplane_bridge.errors import XplaneBridgeError
@@ -201,14 +201,16 @@ class Bags:
                     msgtype = old.msgtype
                     if old.count:
                         times += [old.first_time, old.last_time]
+                count = len(recorded) + (old.count if old else 0)
                 infos[connection.topic] = TopicInfo(
-                    connection.topic,
-                    msgtype,
-                    len(recorded) + (old.count if old else 0),
-                    min(times, default=0),
-                    max(times, default=0),
+                    connection.topic, msgtype, count, min(times, default=0), max(times, default=0)
                 )
         return infos
+
+    @property
+    def written(self) -> tuple[int, int]:
+        """Receive times [ns], as they are in the files, of the first and the last message recorded; 0 without any."""
+        return self._files[0].written()[0], self._files[-1].written()[1]
 
     def times(self, topic: str) -> np.ndarray:
         """Give the receive times of a topic's messages, int64 [ns], sorted; read from the index, not from the data."""
@@ -472,7 +474,8 @@ def _opened(path: Path) -> BagFile:
 @functools.lru_cache(maxsize=None)
 def _say_cut_off(path: Path, lost: int) -> None:
     """Once for a file, on stderr unless the program has set up logging."""
-    _LOG.warning("%s: the recording was cut off; read to its last whole chunk, %d bytes behind it are lost", path, lost)
+    text = "%s: the recording %s; read to its last whole chunk, without %d bytes behind it"
+    _LOG.warning(text, path, ending(path), lost)
 
 
 def _damaged(file: BagFile, err: Exception) -> BagError:

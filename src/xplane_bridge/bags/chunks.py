@@ -90,6 +90,7 @@ class BagFile:
 
     Args:
         path: Of the file.
+        probe: Whether to look for no more than one whole chunk where there is no index.
 
     Attributes:
         connections: By their number in the file.
@@ -100,8 +101,9 @@ class BagFile:
         OSError: The file cannot be read.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, probe: bool = False) -> None:
         self.path = path
+        self._probe = probe
         self.connections: Dict[int, Connection] = {}
         self.lost: Optional[int] = None
         self._chunks: List[Chunk] = []
@@ -129,6 +131,15 @@ class BagFile:
         """Where a connection's messages lie, int64, in the order of `times`: what was written later lies higher."""
         _, chunk, offset = self._index[id_]
         return _places(chunk, offset)
+
+    def written(self) -> Tuple[int, int]:
+        """Receive times [ns], as they are in the file, of the first and the last message in it; 0 without any."""
+        ends: List[Tuple[int, int]] = []
+        for id_, index in self._index.items():
+            place = self.places(id_)
+            for k in (int(place.argmin()), int(place.argmax())) if len(place) else ():
+                ends.append((int(place[k]), int(self._written(index.time[k], place[k]))))
+        return min(ends, default=(0, 0))[1], max(ends, default=(0, 0))[1]
 
     def move(self, after: int, until: int, middle: int, by: int) -> None:
         """Moves the receive times [ns] of what lies behind the place where the recorder's clock went back.
@@ -176,10 +187,14 @@ class BagFile:
         if spans is not None:
             chosen = [(id_, _within(index, spans)) for id_, index in chosen]
         for time, chunk, offset, owner in self._in_order(chosen):
-            written = time - sum(by * (_places(chunk, offset) >= begin) for begin, by in self._moves)
+            written = self._written(time, _places(chunk, offset))
             for k in np.lexsort((offset, chunk, time)):
                 message = _message(self._data(int(chunk[k])), int(offset[k]))
                 yield int(owner[k]), int(time[k]), int(written[k]), message
+
+    def _written(self, time: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Receive times [ns] as they are in the file."""
+        return time - sum(by * (place >= begin) for begin, by in self._moves)
 
     def _in_order(self, chosen: List[Tuple[int, _Index]]) -> Iterator[Tuple[np.ndarray, ...]]:
         """Entries of several connections, some at a time: none is earlier than those that were given before.
@@ -255,7 +270,7 @@ class BagFile:
         self._file.seek(position)
         whole = position
         try:
-            while self._file.tell() < size:
+            while self._file.tell() < size and not (self._probe and self._chunks):
                 header = self._header()
                 if header.get(b"op") == bytes([_CHUNK]):
                     self._scan(self._load(self._skip_chunk(header)))

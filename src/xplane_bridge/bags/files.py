@@ -27,9 +27,10 @@ def bags_in(folder: Path, pattern: str = "*.bag") -> list[Path]:
         folder: Where to look.
         pattern: ``**/*.bag`` also looks in the folders in it.
     """
+    active = list(folder.glob(pattern + _ACTIVE))  # first: what rosbag renames meanwhile is found among the others
     found = set(folder.glob(pattern))
     kept = {path.with_suffix(".orig.bag") for path in found}
-    cut_off = {path for path in folder.glob(pattern + _ACTIVE) if path.with_suffix("") not in found}
+    cut_off = {path for path in active if path.with_suffix("") not in found}
     return sorted(found - kept | set(filter(_has_chunk, cut_off)))
 
 
@@ -39,6 +40,11 @@ def recording_of(path: Path) -> tuple[Path, str]:
     return whole.parent, _PART.sub("", whole.stem)
 
 
+def ending(path: Path) -> str:
+    """What can have happened to a recording without an index."""
+    return "was cut off, or is still being recorded" if path.suffix == _ACTIVE else "was cut off"
+
+
 def part_order(path: Path) -> list[Union[str, int]]:
     """By which the parts of a recording are ordered: NAME_2 before NAME_10."""
     return [int(text) if k % 2 else text for k, text in enumerate(re.split("([0-9]+)", path.name))]
@@ -46,7 +52,7 @@ def part_order(path: Path) -> list[Union[str, int]]:
 
 def _has_chunk(path: Path) -> bool:
     try:
-        BagFile(path).close()
+        BagFile(path, probe=True).close()
     except DamagedError as error:
         _say_left_out(path, str(error))
         return False

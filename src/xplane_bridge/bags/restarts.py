@@ -6,9 +6,13 @@ read, so that whatever sorts or joins by them has one time that only goes on.
 
 A host's clock that is set back does the same within one flight. It was that clock where stamps or receive times of
 flight states fall, in the order in which they were recorded, while simulated time and the count of frames go on: behind
-a restart of X-Plane both begin anew. Time goes on by the simulated time between the two states. A recorder's times fall
-at once and rx_node's stamps up to a second later, each is moved from there on; stamps of nodes that follow the clock
-sooner or later than rx_node are off by the step for that second.
+a restart of X-Plane both begin anew. Where these also fall within a second, states lie in the order of their receive
+times (`rosbag compress`), those from before and behind the step among each other: nothing is moved.
+
+Time goes on by the simulated time between the two states. A recorder's times fall at once and rx_node's stamps up to a
+second later, each is moved from there on; stamps of nodes that follow the clock sooner or later than rx_node are off by
+the step for that second. A step of less than half a second that the recorder's clock did not make, because it is
+another computer's, is not looked for: that takes a pass over every recording.
 
 An rx_node counts its epochs from 0. Where it was started anew in a recording, those that it counts are raised as they
 are read, so that an epoch and a simulator time are of one frame.
@@ -24,15 +28,19 @@ from typing import Any, Callable, Dict, Iterable, Mapping, NamedTuple, Optional,
 import numpy as np
 
 from xplane_bridge.bags.chunks import BagFile
-from xplane_bridge.bags.segments import DEFAULT_MAX_GAP
+from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, rounding
 
 _LOG = logging.getLogger(__name__)
 #: Where frames do not go on, by less only messages that overtook each other go back: they are sorted.
 _FALL_NS = 10**9
-#: Stamps that are so close to the time of receipt cannot have begun anew unless that did.
+#: Stamps that are so close to the time of receipt are left as they are unless that was moved.
 _NEAR_NS = _FALL_NS // 2
 #: Between what was received before and after a restart, where the recorder's clock does not say how long it took.
 _PAUSE_NS = 10**9
+#: Around a clock's step or a restart, in which nothing else may fall.
+_AROUND_NS = 10**9
+#: Between the last state in a file and the first one in the next of the same recording: of simulated time, and frames.
+_NEXT_FILE_S, _NEXT_FILE_FRAMES = 2.0, 1000
 #: Without states for longer, rx_node may have been started anew.
 _INTERRUPTED_NS = round(DEFAULT_MAX_GAP * 1e9)
 #: What `States` are made of beside the time of receipt, in their order; simulated time as received, since the unwrapped
@@ -92,9 +100,33 @@ class States(NamedTuple):
         fallen: np.ndarray = (self.sim_time[1:] < self.sim_time[:-1]) | (self.frame[1:] < self.frame[:-1])
         return ~fallen
 
+    def in_order(self) -> np.ndarray:
+        """Give for each but the first whether around it, itself left out, X-Plane and rx_node went on."""
+        elapsed = np.cumsum(np.maximum(np.diff(self.time, prepend=self.time[:1]), 0))
+        fallen = np.cumsum(np.append(0, ~self.goes_on()))
+        row = np.arange(1, len(elapsed))  # two before and two behind it in any case
+        first = np.minimum(np.searchsorted(elapsed, elapsed[:-1] - _AROUND_NS), np.maximum(row - 2, 0))
+        end = np.searchsorted(elapsed, elapsed[1:] + _AROUND_NS, side="right")
+        last = np.maximum(end - 1, np.minimum(row + 1, len(row)))
+        alone: np.ndarray = fallen[last] - fallen[first] == np.diff(fallen)
+        return alone
+
     def set_back(self, time: np.ndarray) -> np.ndarray:
         """Give the rows at which the host's clock, read at these times [ns], was set back."""
-        return np.flatnonzero((np.diff(time) < 0) & self.goes_on()) + 1
+        fell = np.diff(time) < -1e9 * rounding(self.sim_time[1:])
+        return np.flatnonzero(fell & self.goes_on() & self.in_order()) + 1
+
+    def began_anew(self) -> np.ndarray:
+        """Give the rows at which stamps begin anew with X-Plane."""
+        rows = falls(self.stamp)
+        begin: np.ndarray = rows[(~self.goes_on() & self.in_order())[rows - 1]]
+        return begin
+
+    def in_next_file(self) -> np.ndarray:
+        """Give for each but the first whether it can follow the one before it in the next file of a recording."""
+        passed, frames = np.diff(self.sim_time), np.diff(self.frame.astype(np.int64))
+        follows: np.ndarray = (passed < _NEXT_FILE_S) & (frames < _NEXT_FILE_FRAMES)
+        return follows
 
     def simulated(self, rows: np.ndarray) -> np.ndarray:
         """Give the simulated time [ns] since the state before each of these rows."""
@@ -139,7 +171,8 @@ class Restarts:
         """Move the receive times of all messages that were recorded after the recorder's clock went back.
 
         It did where those of the flight states go back, in the order in which they were written, and frames go on, or
-        their epoch is raised or, in one file, counted anew: receive times of files in disorder go back, too.
+        their epoch is raised or, in one file, counted anew: receive times of files in disorder go back, too. So frames
+        that go on in another file must be the next ones.
 
         Args:
             files: In the order in which they were recorded.
@@ -158,8 +191,9 @@ class Restarts:
         if (np.diff(time) >= 0).all():
             return
         states = self._recorded().rows(order)
-        set_back, fallen = states.set_back(time), falls(time)
-        restarted = states.raised() | (states.counted_anew() & (np.diff(number) == 0))
+        set_back, fallen, same = states.set_back(time), falls(time), np.diff(number) == 0
+        set_back = set_back[(same | states.in_next_file())[set_back - 1]]
+        restarted = states.raised() | (states.counted_anew() & same)
         passed = dict.fromkeys(fallen[restarted[fallen - 1]].tolist(), _PAUSE_NS)
         passed.update(zip(set_back.tolist(), states.simulated(set_back).tolist()))
         for k in sorted(passed, reverse=True):  # from the last: each moves all that follows
@@ -219,7 +253,7 @@ class Restarts:
     def _stamps(self, states: States) -> _Found:
         time, stamp = states.time, states.stamp
         set_back = states.set_back(stamp)
-        new = np.union1d(falls(stamp), set_back)
+        new = np.union1d(states.began_anew(), set_back)
         by_clock = np.isin(new, set_back)
         received = time[new] - time[new - 1]
         passed = np.where(by_clock, states.simulated(new), received)

@@ -12,6 +12,7 @@ from rosbags.rosbag1 import Writer
 
 from support.flights.cut_off import cut_off, without_index
 from xplane_bridge.bags import BagError, Bags
+from xplane_bridge.bags.chunks import BagFile
 from xplane_bridge.bags.columns import ColumnFile
 from xplane_bridge.bags.files import bags_in
 
@@ -410,3 +411,33 @@ def test_a_recording_that_was_cut_off_before_its_first_chunk_is_left_out(tmp_pat
     assert Bags(tmp_path).paths == [part]
     (record,) = caplog.records
     assert record.getMessage().startswith(f"{last}: left out (")
+
+
+def test_of_a_recording_that_was_cut_off_no_more_than_the_first_chunk_is_looked_at(tmp_path: Path, caplog) -> None:
+    path = cut_off(long_flight(tmp_path / "f.bag")[0])
+    probed, whole = BagFile(path, probe=True), BagFile(path)
+    try:
+        ids = [id_ for id_, connection in whole.connections.items() if connection.topic == "/h"]
+        assert 0 < len(probed.times(ids[0])) < len(whole.times(ids[0])) == 3000
+    finally:
+        probed.close()
+        whole.close()
+    path.write_bytes(path.read_bytes()[:-5])
+    with Bags(tmp_path):
+        pass
+    (record,) = caplog.records
+    assert "the recording was cut off, or is still being recorded; read to its last whole chunk" in record.getMessage()
+
+
+def test_a_part_that_is_renamed_meanwhile_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    active = flight(tmp_path / "f.bag").rename(tmp_path / "f.bag.active")
+    look = Path.glob
+
+    def renaming(folder: Path, pattern: str):
+        found = list(look(folder, pattern))
+        if active.exists():
+            active.rename(tmp_path / "f.bag")
+        return found
+
+    monkeypatch.setattr(Path, "glob", renaming)
+    assert bags_in(tmp_path) == [tmp_path / "f.bag"]

@@ -119,3 +119,58 @@ def test_copies_have_the_times_of_the_file_in_the_order_of_recording(tmp_path: P
     assert [time for time, _ in copied] == [stamp_ns(k / 50 - (step if k >= 50 else 0.0)) for k in range(100)]
     assert [raw for _, raw in copied] == [raw for _, raw in read]
     np.testing.assert_allclose(np.diff([time for time, _ in read]), 2e7, atol=1000)
+
+
+@pytest.mark.parametrize("step", [0.6, 0.9, 2.0, 3.0, 10.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_where_the_order_was_lost_no_time_is_added(tmp_path: Path, step: float, seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    back = step + draw.uniform(0.0, 0.02)  # states before and behind the step lie in any phase to each other
+    recorded = []
+    for k in range(1000):
+        flown, late = k / 50, 0.001 + draw.uniform(0.0, 0.012)
+        recorded.append(Recorded(flown, flown + late - back * (k >= 600), flown - back * (k >= 616), 1 + (k >= 616)))
+    frames = sorted(range(1000), key=lambda k: recorded[k].received)
+    with FlightBag(tmp_path / "flight.bag") as bag:
+        for k in frames:
+            flown, received, stamp, epoch = recorded[k]
+            state = {**bag.state(flown, k), "header": bag.header(stamp_ns(stamp), ""), "epoch": epoch}
+            bag.add(STATE, "xplane_bridge/FlightState", stamp_ns(received), state)
+    stamp = states_of(tmp_path / "flight.bag").stamp
+    assert stamp.tolist() == sorted(stamp_ns(each.stamp) for each in recorded)
+
+
+@pytest.mark.parametrize("off", [0.0009, 0.0019])
+def test_a_reset_in_a_pause_is_no_clock_set_back(tmp_path: Path, off: float, caplog: pytest.LogCaptureFixture) -> None:
+    """With `publish_clock`, after three hours: unwrapped time begins anew at the raw one, which is in steps of 1 ms."""
+    with FlightBag(tmp_path / "flight.bag") as bag:
+        for k in range(200):
+            raw = np.float32(10800 + (min(k, 90) if k < 110 else k - 20) / 50)
+            unwrapped = float(raw) + off * (k < 100)
+            stamp = stamp_ns(unwrapped - 10800)
+            times = {"sim_time": raw, "sim_time_unwrapped": unwrapped, "header": bag.header(stamp, "")}
+            state = {**bag.state(k / 50, k), **times, "epoch": 1 + (k >= 100)}
+            bag.add(STATE, "xplane_bridge/FlightState", stamp, state)
+    with caplog.at_level(logging.WARNING), Bags(tmp_path / "flight.bag") as bags:
+        assert len(read_flight(bags).parts) == 4
+    assert caplog.text == ""
+
+
+def test_the_next_file_is_not_of_an_earlier_run_of_x_plane(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    for name, start, begin, first in (("earlier", 0.0, 500.0, 10000), ("later", 100.0, 0.0, 0)):
+        with FlightBag(tmp_path / f"{name}.bag") as bag:
+            for k in range(100):
+                received = stamp_ns(start + k / 50)
+                state = {**bag.state(begin + k / 50, first + k), "header": bag.header(received, "")}
+                bag.add(STATE, "xplane_bridge/FlightState", received, state)
+    given = [tmp_path / "later.bag", tmp_path / "earlier.bag"]
+    with caplog.at_level(logging.WARNING), Bags(given) as bags:
+        flight = read_flight(bags)
+    assert (flight.start, flight.end) == (stamp_ns(0.0), stamp_ns(101.98))
+    assert caplog.text == ""
+
+
+def test_the_times_in_the_file_of_what_was_recorded_first_and_last(tmp_path: Path) -> None:
+    record_a_clock_set_back(tmp_path / "flight.bag", 3.0)
+    with Bags(tmp_path / "flight.bag") as bags:
+        assert bags.written == (stamp_ns(0.0), stamp_ns(1.98 - 3.0))

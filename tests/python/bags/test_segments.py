@@ -56,3 +56,12 @@ def test_a_clock_set_back_is_said_and_cut_where_the_order_was_lost(
     mixed = [slice(k, k + 1) for k in range(54, 78)]
     assert flight.parts == [slice(0, 54), *mixed, slice(78, 100)]
     assert "the host's clock was set back in flight: by their stamps 24 flight states" in caplog.text
+
+
+def test_an_rx_node_that_was_started_anew_while_time_goes_on_shuffles_nothing() -> None:
+    # It counts epochs from 0. The third one is of a pause; unwrapped times are off by less than a float32 step.
+    sim_time = 10800.0 + np.array([0.0, 0.02, 0.0409, 0.04, 0.04, 0.06, 0.08])
+    epoch = np.array([2, 3, 3, 0, 0, 0, 1], dtype=np.uint32)
+    assert not disordered(epoch, sim_time).any()
+    # Where epochs fall because states lie among each other, time falls, too.
+    assert disordered(np.array([1, 2, 1, 2]), np.array([1.0, 3.0, 1.02, 3.02])).tolist() == [False, True, True, False]
