@@ -272,7 +272,7 @@ class SimStatusValid(enum.IntFlag):
     """Bits of SimStatus.valid."""
 
     RATE = 1  #: frame_period, frame_rate
-    TIME = 2  #: time_ratio .. local_time
+    TIME = 2  #: time_ratio .. local_time; time_ratio may be NaN by itself
     VIEW = 4  #: view_*, field_of_view_deg
     WINDOW = 8  #: window_*
 

@@ -114,9 +114,9 @@ void SimLink::setPeer(const Endpoint& peer, const std::string& why) {
   other_address_.reset();
   answered_ns_.reset();
   ended_in_silence_.clear();
+  answered_version_ = 0;
+  answered_epoch_ = 0;
   version_ = {};
-  version_epoch_ = 0;
-  judged_version_ = 0;
   paused_.reset();
   sim_time_s_.reset();
   monitor_.newPeer();

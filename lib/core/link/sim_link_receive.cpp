@@ -100,8 +100,8 @@ void SimLink::takeStatus(const RrefPair& pair) {
   switch (pair.index) {
     case kVersionIndex:
       if (pair.value > 0.0F) {  // zero before a flight is loaded
-        version_.number = static_cast<std::int32_t>(std::lround(pair.value));
-        version_epoch_ = monitor_.epoch();
+        answered_version_ = static_cast<std::int32_t>(std::lround(pair.value));
+        answered_epoch_ = monitor_.epoch();
       }
       break;
     case kPausedIndex:

@@ -81,7 +81,7 @@ std::vector<std::string> SimLink::findProblems(std::int64_t now_ns) const {
     problems.push_back("X-Plane sends Data Output, but nothing answers on " + peer_.toString() +
                        ": only what its rows contain is known (a firewall there; in X-Plane 12, Settings > Network > " +
                        "Accept incoming connections)");
-    if (!versionNow(now_ns).known()) {
+    if (!version_.known()) {
       problems.emplace_back(
           "X-Plane's version is not known, so rows that differ by version (rates, for example) are left "
           "out: set the parameter xplane_version");
@@ -102,13 +102,25 @@ bool SimLink::isOneWay(std::int64_t now_ns) const {
   return monitor_.alive() && live_counters_.data_datagrams > 0 && toSeconds(now_ns - answered_ns) > kAnswerPatienceS;
 }
 
-SimulatorVersion SimLink::versionNow(std::int64_t now_ns) const {
+std::int32_t SimLink::versionNumber(std::int64_t now_ns) const {
   // One that never answers may be another than the one that did before it went away.
-  if (!isOneWay(now_ns) || (version_.known() && version_epoch_ == monitor_.epoch())) {
-    return version_;
+  if (!isOneWay(now_ns) || (answered_version_ > 0 && answered_epoch_ == monitor_.epoch())) {
+    return answered_version_;
   }
   const std::optional<BeaconSighting> beacon = beacons_.at(peer_, now_ns);
-  return {beacon.has_value() ? beacon->version : options_.unheard_version};
+  return beacon.has_value() ? beacon->version : options_.unheard_version;
+}
+
+void SimLink::updateVersion(std::int64_t now_ns) {
+  SimulatorVersion version{versionNumber(now_ns)};
+  // A silence says nothing of the version: one that was known holds until another is, or setPeer().
+  if (!version.known() || version.number == version_.number) {
+    return;
+  }
+  if (options_.otherwise) {
+    version.otherwise = options_.otherwise(peer_, version.number);
+  }
+  version_ = version;
 }
 
 std::string SimLink::reasonOf(LinkState state) const {
@@ -153,17 +165,14 @@ void SimLink::publish(std::int64_t now_ns) {
       unanswered.push_back(std::move(path));
     }
   }
-  if (version_.known() && version_.number != judged_version_ && options_.otherwise) {
-    version_.otherwise = options_.otherwise(peer_, version_.number);
-    judged_version_ = version_.number;
-  }
+  updateVersion(now_ns);
   LinkStatus status;
   status.state = monitor_.state();
   status.epoch = monitor_.epoch();
   status.reason = reasonOf(status.state);
   status.peer = peer_;
   status.computer_name = peer_name_;
-  status.version = versionNow(now_ns);
+  status.version = version_;
   status.one_way = isOneWay(now_ns);
   status.paused = paused_;
   status.sim_time_s = sim_time_s_;

@@ -37,6 +37,12 @@ bool isPreparation(const UndoOperation& operation) {
 
 }  // namespace
 
+bool sendUndo(SimulatorPort* link, const UndoOperations& operations) {
+  bool sent = true;
+  for (const UndoOperation& operation : operations) sent = link->sendUndo(operation) == SendStatus::kSent && sent;
+  return sent;
+}
+
 std::vector<bool> awaitEach(SimulatorPort* link, const std::vector<UndoOperations>& each, double timeout_s) {
   Expected expected;
   for (std::size_t i = 0; i < each.size(); ++i) expected.add(i, each[i]);
@@ -51,8 +57,7 @@ std::vector<bool> awaitEach(SimulatorPort* link, const std::vector<UndoOperation
   const auto values =
       link->readUntil(expected.paths, timeout_s, [missing](const auto& answers) { return missing(answers).empty(); });
   const bool answered = std::any_of(values.begin(), values.end(), [](const auto& value) { return value.has_value(); });
-  const LinkState state = link->status().state;
-  std::vector<bool> shown(each.size(), answered || state == LinkState::kConnected || state == LinkState::kPaused);
+  std::vector<bool> shown(each.size(), answered || link->status().up());
   for (const std::size_t i : missing(values)) shown[i] = false;
   return shown;
 }
@@ -60,9 +65,7 @@ std::vector<bool> awaitEach(SimulatorPort* link, const std::vector<UndoOperation
 std::vector<bool> undoEach(SimulatorPort* link, std::vector<UndoOperations> each, double timeout_s) {
   std::set<std::size_t> not_sent;
   for (std::size_t i = 0; i < each.size(); ++i) {
-    for (const UndoOperation& operation : each[i]) {
-      if (link->sendUndo(operation) != SendStatus::kSent) not_sent.insert(i);
-    }
+    if (!sendUndo(link, each[i])) not_sent.insert(i);
   }
   for (const std::size_t i : not_sent) each[i].clear();  // there is nothing to wait for
   std::vector<bool> shown = awaitEach(link, each, timeout_s);

@@ -12,8 +12,6 @@ namespace {
 // Both are longer in X-Plane (40 and 260); every character costs a request of 413 bytes.
 constexpr std::size_t kIcaoLength = 8;
 constexpr std::size_t kDescriptionLength = 64;
-// X-Plane may answer the characters in different frames of a period.
-constexpr double kJoinWindow = 1.5 / AircraftIdentityReader::kRateHz;
 
 /// Whether a character is missing that stands before the end of a text that X-Plane has.
 bool isBroken(const std::vector<float>& values, std::size_t first, std::size_t length) {
@@ -60,7 +58,7 @@ bool isListed(const AircraftIdentity& aircraft, const std::vector<std::string>& 
 }
 
 AircraftIdentityReader::AircraftIdentityReader()
-    : frames_(datarefs().size(), 0, RrefFrameAssembler::Options::joinedWithin(kJoinWindow)) {}
+    : frames_(datarefs().size(), 0, RrefFrameAssembler::Options::atRate(kRateHz)) {}
 
 const std::vector<std::string>& AircraftIdentityReader::datarefs() {
   static const std::vector<std::string> kDatarefs = [] {

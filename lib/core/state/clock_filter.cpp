@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "xplane_bridge/core/base/units.hpp"
+#include "xplane_bridge/core/base/unknown.hpp"
 
 namespace xplane_bridge::core {
 namespace {
@@ -136,7 +137,6 @@ ClockEstimate ClockFilter::update(const ClockSample& sample) {
   estimate.epoch = epoch_;
   estimate.sim_time = sim_time_;
   estimate.stamp_ns = stampOf(sample);
-  estimate.time_ratio = timeRatio();
   estimate.uncertainty = uncertainty();
   return estimate;
 }
@@ -175,13 +175,19 @@ std::optional<std::int64_t> ClockFilter::hostTime(double sim_time) const {
 }
 
 double ClockFilter::timeRatio() const {
-  if (!fitted_) return 1.0;
+  if (options_.exact) return 1.0;
+  if (!fitted_) return kNaN;
   const double span = bucket(count_ - 1).sim - bucket(0).sim;
   double slipped = 0.0;
   for (std::size_t i = 0; i < slips_kept_ && newestSlip(i).before >= bucket(0).sim; ++i) {
     slipped += newestSlip(i).length;
   }
   return span / (slope_ * span + slipped);
+}
+
+bool ClockFilter::mayHaveLastedLonger(float simulated, float acceleration) const {
+  return !options_.exact && isKnownPeriod(simulated) &&
+         static_cast<double>(simulated) >= options_.longest_frame * static_cast<double>(acceleration);
 }
 
 double ClockFilter::uncertainty() const {
@@ -279,8 +285,7 @@ bool ClockFilter::judgeSlip(const ClockSample& sample, const Point& point) {
   }
   const double before = sim_time_before_ - sim_reference_;
   // Such a frame says itself that it may have lasted longer; a datagram that was late only moves the line back soon.
-  if (isKnownPeriod(sample.frame_period) &&
-      static_cast<double>(sample.frame_period) >= options_.longest_frame * static_cast<double>(sample.acceleration)) {
+  if (mayHaveLastedLonger(sample.frame_period, sample.acceleration)) {
     slip(point, before, late);
     return true;
   }

@@ -34,10 +34,20 @@ void finish(AutopilotState& autopilot, const ClockFilter&) {
 
 void finish(EngineStates& engines, const ClockFilter&) { computeCelsius(engines); }
 
+/// Frames per second of host time; NaN where only the clock can say it and has no fit.
+float frameRate(const SimStatus& status, const ClockFilter& clock) {
+  if (!(status.frame_period > 0.0F)) return kNaNf;
+  const float acceleration = timeAcceleration(status.time_ratio_requested);
+  const float simulated = status.frame_period * acceleration;
+  if (!clock.mayHaveLastedLonger(simulated, acceleration)) return 1.0F / status.frame_period;
+  return static_cast<float>(clock.timeRatio()) / simulated;
+}
+
 void finish(SimStatus& status, const ClockFilter& clock) {
   status.time_ratio = static_cast<float>(clock.timeRatio());
   status.frames_missed = static_cast<std::uint32_t>(clock.missedFrames());
-  if (!std::isfinite(status.frame_rate) && status.frame_period > 0.0F) status.frame_rate = 1.0F / status.frame_period;
+  if (!std::isfinite(status.frame_rate)) status.frame_rate = frameRate(status, clock);
+  if (std::isnan(status.frame_rate)) status.valid &= ~SimStatus::kValidRate;
 }
 
 void finish(EnvironmentState& world, const ClockFilter&) {
@@ -221,7 +231,10 @@ bool FlightStateAssembler::jumped(const FlightState& state) const {
       (state.position_source == PositionSource::kFloat32 || state_.position_source == PositionSource::kFloat32)) {
     return false;
   }
-  const double elapsed = std::max(0.0, inputs_.sim_time - static_cast<double>(state_.sim_time));
+  const double step = inputs_.sim_time - static_cast<double>(state_.sim_time);
+  // A late datagram, which the clock drops: under time acceleration its frame may lie far behind.
+  if (step < 0.0 && step >= -options_.clock.backward_tolerance) return false;
+  const double elapsed = std::max(0.0, step);
   const double speed = state_.has(FlightState::kValidVelocity) ? state_.velocity_ned.norm() : 0.0;
   // Twice the way it could have flown: accelerations over a gap in the stream are no jump.
   const double reach = options_.jump_distance + 2.0 * speed * elapsed;

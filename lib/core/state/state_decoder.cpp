@@ -115,11 +115,13 @@ std::uint32_t StateDecoder::decode(const std::vector<float>& dataref_values, con
                                    std::int64_t oldest_ns, void* target) const {
   std::uint32_t known_bits = all_bits_;
   int engines = kMaxEngines;
+  int engines_in_rows = kMaxEngines;  // one way a row shows them without their count, which is a dataref
   for (const Plan& plan : plans_) {
     const bool from_row = plan.row >= 0;
     const bool arrived =
         !from_row || (rows != nullptr && rows->has(plan.row) && rows->receiveTime(plan.row) >= oldest_ns);
-    const int wanted = plan.per_engine ? std::min(plan.count, engines) : plan.count;
+    const int bound = !plan.per_engine ? plan.count : from_row ? engines_in_rows : engines;
+    const int wanted = std::min(plan.count, bound);
     std::array<double, kMaxFieldElements> values;
     int known = 0;
     if (arrived && wanted > 0) {
@@ -128,10 +130,13 @@ std::uint32_t StateDecoder::decode(const std::vector<float>& dataref_values, con
       plan.store(target, values.data(), wanted);
     }
     if (plan.is_engine_count) {
-      engines = known > 0 ? static_cast<int>(std::clamp(values[0], 0.0, static_cast<double>(kMaxEngines))) : 0;
+      const double count = known > 0 ? std::clamp(values[0], 0.0, static_cast<double>(kMaxEngines)) : 0.0;
+      engines = static_cast<int>(count);
+      const bool uncounted = known == 0 && rows != nullptr && rows->isOneWay();
+      engines_in_rows = uncounted ? kMaxEngines : engines;
     }
     // Of an array by engine every engine must be known; other arrays may be longer than what the aircraft has.
-    const bool complete = known > 0 && (!plan.per_engine || known == engines);
+    const bool complete = known > 0 && (!plan.per_engine || known == bound);
     if (!complete) known_bits &= ~plan.valid;
   }
   return known_bits;

@@ -5,12 +5,6 @@
 #include <functional>
 
 namespace xplane_bridge::core {
-namespace {
-
-// X-Plane may answer them in different frames of a period.
-constexpr double kJoinWindow = 1.5 / XPlaneSettings::kRateHz;
-
-}  // namespace
 
 bool sameValues(const std::vector<float>& a, const std::vector<float>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](float one, float other) {
@@ -18,8 +12,7 @@ bool sameValues(const std::vector<float>& a, const std::vector<float>& b) {
   });
 }
 
-XPlaneSettings::XPlaneSettings()
-    : frames_(datarefs().size(), 0, RrefFrameAssembler::Options::joinedWithin(kJoinWindow)) {}
+XPlaneSettings::XPlaneSettings() : frames_(datarefs().size(), 0, RrefFrameAssembler::Options::atRate(kRateHz)) {}
 
 const std::vector<std::string>& XPlaneSettings::datarefs() {
   static const std::vector<std::string> kDatarefs = {

@@ -27,7 +27,7 @@ RrefFrameAssembler::RrefFrameAssembler(std::size_t size, std::int32_t first_inde
 
 bool RrefFrameAssembler::add(const RrefView& datagram, std::int64_t receive_ns) {
   const std::int64_t window_ns = toNanoseconds(options_.join_window);
-  if (open_ && receive_ns - frame_start_ns_ > window_ns) closeFrame(false);
+  if (open_ && receive_ns - last_piece_ns_ > window_ns) closeFrame(false);
   bool completed = false;
   for (std::size_t i = 0; i < datagram.size(); ++i) {
     const RrefPair pair = datagram[i];
@@ -42,6 +42,7 @@ bool RrefFrameAssembler::add(const RrefView& datagram, std::int64_t receive_ns) 
       closeFrame(isWhole());
     }
     if (!open_) beginFrame(receive_ns);
+    last_piece_ns_ = receive_ns;
     seen_[p] = 1;
     if (silent_[p] != 0) {
       silent_[p] = 0;

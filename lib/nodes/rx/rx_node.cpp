@@ -58,6 +58,8 @@ void RxNode::loadParameters(const ParamLoader& own) {
   assembler.transport = common().transport;
   assembler.rate = options_.rates[static_cast<std::size_t>(core::FieldGroup::kFlight)];
   assembler.position = options_.position_source;
+  assembler.clock = core::ClockFilter::Options::atRate(
+      assembler.transport == core::Transport::kData ? options_.data_output_rate : assembler.rate);
   assembler.clock.exact = lockstep();
   flight_ = std::make_unique<core::FlightStateAssembler>(assembler);
   if (options_.origin) {
@@ -277,6 +279,8 @@ void RxNode::onXpc(const core::XpcPosition& position, const core::ReceiveInfo& i
 void RxNode::onLinkState(const core::LinkStatus& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
   last_status_ = status;
+  // Rows may come so slowly that the link is silent between two of them; that does not end one way.
+  if (status.up()) rows_.setOneWay(status.one_way);
   publishLinkState(status);
 }
 
@@ -376,8 +380,7 @@ void RxNode::adoptVersion(const core::LinkStatus& status) {
   if (version.known()) {
     version_patience_.reset();
   } else {
-    const bool answers = status.state == core::LinkState::kConnected || status.state == core::LinkState::kPaused;
-    if (!answers) {
+    if (!status.up()) {
       version_patience_.reset();
       return;
     }

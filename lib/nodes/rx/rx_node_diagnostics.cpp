@@ -80,10 +80,6 @@ const char* nameOf(core::PositionSource source) {
 
 constexpr const char* kNotConnected = "not connected";
 
-bool isConnected(const core::LinkStatus& status) {
-  return status.state == core::LinkState::kConnected || status.state == core::LinkState::kPaused;
-}
-
 // A group counts as not arriving when its last message is older than this many of its periods and a bit.
 constexpr double kLatePeriods = 2.5;
 constexpr double kLateMargin = 0.5;  // [s]
@@ -159,7 +155,7 @@ void RxNode::diagnoseFlight(diagnostic_updater::DiagnosticStatusWrapper* status)
 void RxNode::diagnoseClock(diagnostic_updater::DiagnosticStatusWrapper* status) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const core::ClockFilter& clock = flight_->clock();
-  if (!isConnected(last_status_)) {
+  if (!last_status_.up()) {
     status->summary(DiagnosticStatus::WARN, kNotConnected);
   } else if (!last_state_) {
     status->summary(DiagnosticStatus::OK, "no simulator time yet");
@@ -187,7 +183,7 @@ void RxNode::diagnosePosition(diagnostic_updater::DiagnosticStatusWrapper* statu
   const core::PositionCheck& check = flight_->positionCheck();
   const core::PositionSource source = last_state_ ? last_state_->position_source : core::PositionSource::kNone;
   status->summary(DiagnosticStatus::OK, nameOf(source));
-  if (!isConnected(last_status_)) status->summary(DiagnosticStatus::WARN, kNotConnected);
+  if (!last_status_.up()) status->summary(DiagnosticStatus::WARN, kNotConnected);
   if (check.verdict() == core::PositionCheck::Verdict::kDisagrees) {
     status->mergeSummary(DiagnosticStatus::WARN,
                          "positions computed on the sphere disagree with RPOS: this X-Plane may use another earth");

@@ -254,9 +254,12 @@ def _engine_series(flight: Flight, column: str, name: str, factor: float = 1.0) 
     t = flight.tables["engines"]
     count = int(t["count"].max()) if len(t) else 0
     out = []
-    for k in range(min(count, t[column].shape[1])):
+    for k in range(t[column].shape[1]):
         values = t[column][:, k]
-        if np.isfinite(values).any():
+        finite = values[np.isfinite(values)]
+        # One way, X-Plane's rows come without the number of engines, and with 0 for those that the aircraft lacks.
+        exists = k < count if count else finite.any()
+        if exists and finite.size:
             out.append(Series(name.format(k + 1), t.stamp, values * factor))
     return out
 

@@ -118,7 +118,7 @@ class FakeSimulator : public SimulatorPort {
   /// The link's state from now on. Coming from SEARCHING or LOST, X-Plane counts as new: the epoch is raised.
   void setState(LinkState state) {
     const bool was_away = status_.state == LinkState::kSearching || status_.state == LinkState::kLost;
-    const bool is_there = state == LinkState::kConnected || state == LinkState::kPaused;
+    const bool is_there = core::answers(state);
     if (was_away && is_there) {
       ++status_.epoch;
     }
@@ -297,7 +297,7 @@ class FakeSimulator : public SimulatorPort {
     }
   }
 
-  bool answers() const { return status_.state == LinkState::kConnected || status_.state == LinkState::kPaused; }
+  bool answers() const { return status_.up(); }
 
   static bool isAlivePid(const JournalOwner& owner) { return owner.pid == kAlivePid; }
   void useJournal(const std::string& path) { journal_ = std::make_shared<Journal>(path, self_, isAlivePid); }

@@ -94,7 +94,7 @@ def one_way(world, version, *arguments, **params):
     from xplane_bridge.msg import DataRows, FlightState, LinkState
 
     port = free_udp_port()
-    rows = ("--data-target", f"127.0.0.1:{port}", "--data-rows", "0,1,3-6,8,14-21", "--rate", "60")
+    rows = ("--data-target", f"127.0.0.1:{port}", "--data-rows", "0,1,3-6,8,14-21,25", "--rate", "60")
     pilot = config_file("scenarios", "demo.yaml")
     world.xplane = world.emulator(*KINEMATIC, "--version", version, "--pilot", pilot, "--deaf", *rows)
     world.set_param("transport", "data")
@@ -159,3 +159,14 @@ def test_one_way_with_its_version_given_to_the_launch_file_publishes_rates(world
     one_way(world, "11", "xplane_version:=115501")
     world.states.wait_for(lambda state: state.valid & RATES, WAIT_S)
     world.links.wait_for(lambda link: link.xplane_version == 115501)
+
+
+def test_one_way_rows_show_the_engines_without_their_number(world):
+    from xplane_bridge.msg import EngineStates
+
+    throttle_command = 1 << 0
+    log = world.watch("mission/engines", EngineStates)
+    one_way(world, "11", xplane_version=115501)
+    engines = log.wait_for(lambda message: message.valid & throttle_command, WAIT_S)
+    assert engines.count == 0
+    assert all(math.isfinite(lever) for lever in engines.throttle_command)

@@ -195,6 +195,17 @@ def test_mission_state_arrives_complete(world, rx):
     assert math.isfinite(surfaces.delta_aileron)
 
 
+@both_transports
+def test_a_slow_simulator_is_seen_by_a_state_a_second(world, rx):
+    from xplane_bridge.msg import SimStatus
+
+    world.emulator(*KINEMATIC, "--fps", 10)  # of each tenth of a second, a twentieth is simulated
+    log = world.watch("mission/sim", SimStatus)
+    rx(rates={"flight": 1}, data_output_rate=1)
+    world.wait_for_diagnostics("clock", lambda s: s.level == 1 and "% of real time" in s.message, WAIT_S)
+    log.wait_for(lambda m: abs(m.time_ratio - 0.5) < 0.05, WAIT_S, "half of real time")
+
+
 def test_a_frame_split_over_datagrams_is_joined(world, rx):
     world.emulator(*KINEMATIC, "--rref-split", 40)
     rx()

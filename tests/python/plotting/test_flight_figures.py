@@ -117,6 +117,20 @@ def test_every_surface_that_moves_is_drawn(tmp_path: Path) -> None:
     assert {tuple(series.name for series in panel.series) for panel in panels} == {("wing 1 left", "wing 1 right")}
 
 
+@pytest.mark.parametrize(("count", "drawn"), [(0, ["engine 1", "engine 2"]), (1, ["engine 1"])])
+def test_engines_are_drawn_also_without_their_number(tmp_path: Path, count: int, drawn: list[str]) -> None:
+    """As one way: rows have eight places, and 0 where the aircraft has no engine."""
+    with FlightBag(tmp_path / "engines.bag") as bag:
+        for k in range(50):
+            ns = stamp_ns(k / 50)
+            thrust = [1000.0 + k, 900.0, *[0.0] * 5, np.nan]
+            engines = {"header": bag.header(ns, ""), "count": count, "thrust": thrust, "power": [np.nan] * 8}
+            bag.add("/xplane/mission/engines", "xplane_bridge/EngineStates", ns, engines)
+    panels = {panel.label: panel.series for panel in figure(read(tmp_path / "engines.bag"), "engines").panels}
+    assert [series.name for series in panels["thrust [N]"]] == drawn
+    assert "power [kW]" not in panels
+
+
 def test_a_thinned_track_stays_interrupted_in_every_figure() -> None:
     east = np.arange(20001.0)
     east[9_999] = np.nan

@@ -8,6 +8,9 @@
 
 namespace xplane_bridge::core {
 
+/// X-Plane answers: what is sent now acts, and can be read back.
+constexpr bool answers(LinkState state) { return state == LinkState::kConnected || state == LinkState::kPaused; }
+
 struct LinkMonitorOptions {
   double stale_after_s = 0.4;
   double lost_after_s = 10.0;
@@ -37,7 +40,7 @@ class LinkMonitor {
   /// Raised each time the link came up anew: first answer, return after LOST, restart of X-Plane. 0 before.
   std::uint32_t epoch() const { return epoch_; }
   /// Whether X-Plane answers at the moment.
-  bool alive() const { return state_ == LinkState::kConnected || state_ == LinkState::kPaused; }
+  bool alive() const { return answers(state_); }
   /// [s] since the last valid datagram; NaN before the first.
   double silence(std::int64_t now_ns) const;
   /// Whether the beacon was heard and has been gone for longer than its timeout.

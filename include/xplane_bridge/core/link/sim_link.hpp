@@ -218,7 +218,8 @@ class SimLink : public SimulatorPort {
   std::vector<std::string> findProblems(std::int64_t now_ns) const;
   void findSearchProblems(std::int64_t now_ns, std::vector<std::string>* problems) const;
   bool isOneWay(std::int64_t now_ns) const;
-  SimulatorVersion versionNow(std::int64_t now_ns) const;
+  std::int32_t versionNumber(std::int64_t now_ns) const;
+  void updateVersion(std::int64_t now_ns);
   std::string reasonOf(LinkState state) const;
   void publish(std::int64_t now_ns);
 
@@ -299,9 +300,9 @@ class SimLink : public SimulatorPort {
   std::int64_t next_rpos_request_ns_ = 0;
   std::int64_t next_xpc_request_ns_ = 0;
 
-  SimulatorVersion version_;
-  std::uint32_t version_epoch_ = 0;  // monitor_'s, when X-Plane said it
-  std::int32_t judged_version_ = 0;  // for which options_.otherwise was asked
+  std::int32_t answered_version_ = 0;  // X-Plane's own answer; 0: none yet
+  std::uint32_t answered_epoch_ = 0;   // monitor_'s at that answer
+  SimulatorVersion version_;           // the last known versionNumber(), and what options_.otherwise says of it
   std::optional<bool> paused_;
   std::optional<float> sim_time_s_;
   LinkCounters live_counters_;  // of this thread; published by maintain()

@@ -20,6 +20,8 @@
 namespace xplane_bridge::core {
 
 struct LinkStatus {
+  bool up() const { return answers(state); }
+
   LinkState state = LinkState::kSearching;
   std::string reason;                ///< one sentence
   std::uint32_t epoch = 0;           ///< raised each time the link came up anew; 0 before the first time

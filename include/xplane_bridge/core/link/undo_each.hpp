@@ -10,6 +10,9 @@ namespace xplane_bridge::core {
 /// What undoes one entry, in the order in which it is carried out.
 using UndoOperations = std::vector<UndoOperation>;
 
+/// Sends what undoes one entry; returns whether all of it was sent.
+bool sendUndo(SimulatorPort* link, const UndoOperations& operations);
+
 /// Waits until X-Plane shows what each of several, which were sent, has written; returns of which it has. What has
 /// nothing to be read back counts as shown where X-Plane answers, or where none of them has.
 std::vector<bool> awaitEach(SimulatorPort* link, const std::vector<UndoOperations>& each, double timeout_s);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
@@ -78,7 +79,6 @@ struct ClockEstimate {
   std::int64_t stamp_ns = 0;  ///< host time of the simulator frame; strictly increasing within an epoch [ns]
   double sim_time = 0.0;      ///< unwrapped simulator time, no float32 steps; starts at the raw value of each epoch [s]
   double uncertainty = 0.0;   ///< half width around stamp_ns, without the smallest delay, which cannot be measured [s]
-  double time_ratio = 1.0;    ///< simulator time over host time
   std::uint32_t epoch = 0;
   ClockEvent event = ClockEvent::kNone;
 };
@@ -113,6 +113,20 @@ class ClockFilter {
     double max_time_ratio = 20.0;     ///< fastest time acceleration taken for real
     bool exact = false;  ///< receive times are the frames' own: nothing is fitted, stamps are receive times
     double unfitted_uncertainty = 0.02;  ///< said while there is no fit: one frame at a low rate [s]
+
+    /// For samples that come at this rate [1/s], or at the frame rate where that is lower: at low rates the times above
+    /// hold no, or too few, samples to judge by. Halves of a period, so that jitter does not change how many samples it
+    /// takes. A slip takes one more than a change of rate: few samples of a rate that has changed may pass as evenly
+    /// late, as they widen the fit by which that is judged.
+    static Options atRate(int rate_hz) {
+      constexpr double kSilentPeriods = 3.0, kLatePeriods = 2.5, kEvenPeriods = 3.5, kFitPeriods = 8.0;
+      Options options;
+      options.gap = std::max(options.gap, kSilentPeriods / rate_hz);
+      options.rate_change_after = std::max(options.rate_change_after, kLatePeriods / rate_hz);
+      options.slip_after = std::max(options.slip_after, kEvenPeriods / rate_hz);
+      options.window = std::max(options.window, kFitPeriods / rate_hz);
+      return options;
+    }
   };
 
   ClockFilter() = default;
@@ -136,8 +150,11 @@ class ClockFilter {
   bool paused() const { return paused_; }
   /// Half width of the mapping [s], see ClockEstimate.
   double uncertainty() const;
-  /// Simulator time over host time, slips included.
+  /// Simulator time over host time, slips included; NaN while there is no fit.
   double timeRatio() const;
+  /// Whether a frame may have lasted longer on the host than it says: it is as long as X-Plane simulates at most.
+  /// @param simulated simulator time of the frame [s]
+  bool mayHaveLastedLonger(float simulated, float acceleration) const;
   /// Slips seen so far; simTime() of moments near the newest slip may have changed.
   std::uint32_t slips() const { return slip_count_; }
   std::uint32_t epoch() const { return epoch_; }

@@ -61,7 +61,7 @@ struct FieldSpec {
   std::array<DatarefSource, 2> datarefs{};  ///< of different versions, at most one of which fits
   RowSource row{};
   const char* remark = "";       ///< [? id] marks what only a live simulator can settle
-  bool per_engine = false;       ///< elements at or beyond the engine count are not known
+  bool per_engine = false;       ///< elements at or beyond the engine count are not known; without it, a row's all are
   bool is_engine_count = false;  ///< is that count; comes before the fields it bounds
 };
 

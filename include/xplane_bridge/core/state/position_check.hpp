@@ -12,14 +12,16 @@ namespace xplane_bridge::core {
 
 /// Compares positions computed on the sphere with RPOS doubles. RPOS carries no time, so the two are compared where the
 /// flown track passes nearest to the RPOS point: what counts is the height and the distance across the track.
+///
+/// Between two positions the track is taken as straight. By how much it bows out there is estimated from how it turns;
+/// where that is too much, as in turns at a few positions a second, nothing is compared.
 class PositionCheck {
  public:
   enum class Verdict : std::uint8_t { kUnknown, kAgrees, kDisagrees };
 
   struct Options {
-    double tolerance = 0.05;     ///< height and cross-track [m]
-    int checks = 5;              ///< comparisons before a verdict
-    double max_segment = 200.0;  ///< track pieces longer than this are jumps, not flight [m]
+    double tolerance = 0.05;  ///< height and cross-track, beside what the track bows out [m]; that may be as much
+    int checks = 5;           ///< comparisons before a verdict
   };
 
   PositionCheck() = default;

@@ -25,6 +25,9 @@ class RowStore {
   /// The 8 raw wire values of a row in 0..199.
   const float* values(std::int32_t row) const { return &values_[static_cast<std::size_t>(row) * kDataSlots]; }
   void clear();
+  /// Rows are all that comes: datarefs that go with them, as the number of engines, are not waited for.
+  void setOneWay(bool one_way) { one_way_ = one_way; }
+  bool isOneWay() const { return one_way_; }
 
   static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
 
@@ -33,6 +36,7 @@ class RowStore {
  private:
   std::array<float, kRows * kDataSlots> values_{};
   std::array<std::int64_t, kRows> times_{};
+  bool one_way_ = false;
 };
 
 /// Wire values of one group into its struct, in SI units, by a plan made once from the field table.

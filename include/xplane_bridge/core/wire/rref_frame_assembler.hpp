@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -11,7 +12,7 @@ namespace xplane_bridge::core {
 /// Joins the RREF datagrams of one simulator frame into one sample.
 ///
 /// X-Plane may put a frame's values into one datagram or several [? samples-whole]. A sample is complete when every
-/// index that answers at all has come; an index that comes again, or a piece that comes too late, begins the next
+/// index that answers at all has come; an index that comes again, or a piece after a long pause, begins the next
 /// frame. An index that stays away for several frames is taken as unknown [? unknown-omitted]: silent() names it, its
 /// value is NaN and it does not hold up samples. It counts again as soon as it answers.
 ///
@@ -19,22 +20,21 @@ namespace xplane_bridge::core {
 class RrefFrameAssembler {
  public:
   struct Options {
-    /// Pieces this long after the first belong to another frame [s].
+    /// A piece this long after the one before it belongs to another frame [s].
     double join_window = 0.005;
     /// Frames in a row without an index before it is taken as silent.
     int frames_until_silent = 3;
 
-    /// For pieces that belong together within so many seconds.
-    static Options joinedWithin(double seconds) {
-      Options options;
-      options.join_window = seconds;
-      return options;
-    }
     /// For a group that is asked for at this rate: below the frame rate X-Plane may answer its indices in different
-    /// frames of a period, for example one whose first request was lost.
+    /// frames of a period, for example one whose first request was lost. What comes nearly a period later belongs to
+    /// the next sample: after a loss, the end of one and the beginning of the next would be joined from then on.
+    /// Above 3/4 of the frame rate that is less than a frame: samples are of one frame each, and one that lacks an
+    /// index is given up.
     static Options atRate(int rate_hz) {
-      constexpr double kPeriods = 1.5;
-      return joinedWithin(kPeriods / rate_hz);
+      constexpr double kPeriods = 0.75;
+      Options options;
+      options.join_window = std::max(options.join_window, kPeriods / rate_hz);
+      return options;
     }
   };
 
@@ -84,6 +84,7 @@ class RrefFrameAssembler {
   std::size_t silent_count_ = 0;
   bool open_ = false;
   std::int64_t frame_start_ns_ = 0;
+  std::int64_t last_piece_ns_ = 0;  ///< of the open frame
   std::int64_t sample_start_ns_ = 0;
   Counters counters_;
 };

@@ -44,7 +44,7 @@ struct RxOptions {
 
   // transport `data` only
   bool configure_xplane = true;          ///< set rows, rate and target in X-Plane, and restore them
-  int data_output_rate = 99;             ///< [1/s] asked of X-Plane's Data Output while we run
+  int data_output_rate = 99;             ///< [1/s] of X-Plane's Data Output while we run
   std::string data_address;              ///< IPv4 address X-Plane shall send to; empty: ours, as X-Plane sees it
   std::int32_t xplane_version = 0;       ///< of an X-Plane that answers nothing, e.g. 115501; 0: unknown
   std::vector<std::int32_t> extra_rows;  ///< rows wanted on `data_rows` beyond those the state needs

@@ -415,6 +415,36 @@ TEST_F(ScriptedLink, OneThatNeverAnswersIsNotTakenForTheOneThatDid) {
   EXPECT_EQ(link_->status().version.number, 122015);
 }
 
+TEST_F(ScriptedLink, AVersionIsJudgedOnceWhetherXPlaneAnswersItOrTheOptionGivesIt) {
+  SimLinkOptions options = defaults();
+  options.unheard_version = 122015;
+  options.data_output.enabled = true;
+  options.data_output.configure = false;
+  options.data_output.rows = {3};
+  std::vector<std::pair<Endpoint, std::int32_t>> judged;
+  options.otherwise = [&judged](const Endpoint& peer, std::int32_t number) {
+    judged.emplace_back(peer, number);
+    return static_cast<std::uint32_t>(number == 122015 ? Otherwise::kRow16 : Otherwise::kVehs);
+  };
+  makeLink(options);
+  for (int k = 0; k < 100; ++k) {
+    if (k > 50 && k < 70) continue;  // a silence of 1 s
+    arrive((1000 + 50 * k) * kMs, "data", data(1.0F));
+    if (k > 80) arriveStatus((1000 + 50 * k) * kMs, 50.0F + 0.05F * static_cast<float>(k));
+  }
+  const SimulatorVersion by_option{122015, static_cast<std::uint32_t>(Otherwise::kRow16)};
+  runUntil(3500 * kMs);
+  EXPECT_EQ(link_->status().version, by_option);
+  runUntil(4400 * kMs);
+  EXPECT_EQ(link_->status().state, LinkState::kStale);
+  EXPECT_EQ(link_->status().version, by_option);
+  runUntil(4900 * kMs);
+  EXPECT_EQ(link_->status().version, by_option);
+  runUntil(5500 * kMs);
+  EXPECT_EQ(link_->status().version, (SimulatorVersion{115501, static_cast<std::uint32_t>(Otherwise::kVehs)}));
+  EXPECT_EQ(judged, (std::vector<std::pair<Endpoint, std::int32_t>>{{kXPlane, 122015}, {kXPlane, 115501}}));
+}
+
 TEST_F(ScriptedLink, SameScriptGivesTheSameDatagrams) {
   std::vector<std::vector<ScriptedHub::Sent>> sent;
   std::vector<std::vector<Delivery>> delivered;

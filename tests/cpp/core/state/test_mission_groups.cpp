@@ -188,6 +188,49 @@ TEST(MissionGroups, AirspeedDialIsKnotsOrMach) {
   }
 }
 
+/// SimStatus by RREF with this frame_rate_period and sim_speed, at a clock whose frames come so far apart.
+SimStatus statusAt(float frame_period, float sim_speed, double host_period, const ClockFilter::Options& options = {}) {
+  ClockFilter clock(options);
+  const double step = static_cast<double>(frame_period * timeAcceleration(sim_speed));
+  for (int i = 0; i < 100; ++i) {
+    ClockSample sample;
+    sample.receive_ns = kStart + toNanoseconds(i * host_period);
+    sample.sim_time = static_cast<float>(100.0 + i * step);
+    sample.acceleration = timeAcceleration(sim_speed);
+    sample.frame_period = static_cast<float>(step);
+    if (host_period > 0.0) clock.update(sample);
+  }
+  EXPECT_EQ(clock.fitted(), host_period > 0.0 && !options.exact);
+  MissionAssembler<SimStatus>::Options group;
+  group.version = kXPlane11;
+  MissionAssembler<SimStatus> assembler(group);
+  Datagram d = Datagram::labelled("RREF,");
+  for (std::size_t i = 0; i < assembler.requests().size(); ++i) {
+    const std::string& path = assembler.requests()[i].path;
+    const bool period = path == "sim/operation/misc/frame_rate_period";
+    d.pair(static_cast<std::int32_t>(i), period ? frame_period : path == "sim/time/sim_speed" ? sim_speed : 1.0F);
+  }
+  EXPECT_TRUE(assembler.add(d.rref(), kStart));
+  return assembler.assemble(nullptr, kStart, clock);
+}
+
+// X-Plane simulates at most 1/19.9 s in a frame, however long it lasts.
+TEST(MissionGroups, FrameRateIsThatOfRealTimeAlsoBelowTwentyFrames) {
+  constexpr float kLongest = 1.0F / 19.9F;
+  constexpr double kNoClock = 0.0;
+  ClockFilter::Options lockstep;
+  lockstep.exact = true;
+  EXPECT_NEAR(statusAt(kLongest, 1.0F, 0.1).frame_rate, 10.0, 1e-2);
+  EXPECT_NEAR(statusAt(kLongest, 4.0F, 0.1).frame_rate, 10.0, 1e-2);
+  EXPECT_NEAR(statusAt(1.0F / 60.0F, 4.0F, 1.0 / 60.0).frame_rate, 60.0, 1e-3);
+  EXPECT_NEAR(statusAt(1.0F / 60.0F, 1.0F, kNoClock).frame_rate, 60.0, 1e-3);
+  EXPECT_NEAR(statusAt(0.05F, 1.0F, 0.05, lockstep).frame_rate, 20.0, 1e-3);
+  const SimStatus unknown = statusAt(kLongest, 1.0F, kNoClock);
+  EXPECT_TRUE(std::isnan(unknown.frame_rate));
+  EXPECT_FLOAT_EQ(unknown.frame_period, kLongest);
+  EXPECT_EQ(unknown.valid, SimStatus::kValidAll & ~SimStatus::kValidRate);
+}
+
 // The stamp of a slower group is that of its simulator time, by the flight group's clock.
 TEST(MissionGroups, StampComesFromTheSimulatorsTime) {
   ClockFilter clock;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
 
 #include "xplane_bridge/core/base/units.hpp"
 
@@ -88,6 +89,49 @@ TEST(PositionCheck, ChangesItsMind) {
     }
   }
   EXPECT_EQ(check.verdict(), PositionCheck::Verdict::kDisagrees);
+}
+
+/// All verdicts of a minute in level turns of so many g (0: straight), with a position every `period` [s] and RPOS 20
+/// times a second, moved by `error` (ENU) [m].
+std::set<PositionCheck::Verdict> verdicts(double period, double speed, double lateral_g, const Vector3d& error) {
+  const double curvature = lateral_g * 9.80665 / (speed * speed);
+  const auto place = [&](double t) {
+    const double angle = curvature * speed * t;
+    if (curvature == 0.0) return Vector3d(speed * t, 0.0, 1000.0);
+    return Vector3d(std::sin(angle) / curvature, (1.0 - std::cos(angle)) / curvature, 1000.0);
+  };
+  PositionCheck check;
+  std::set<PositionCheck::Verdict> out;
+  int computed = 0;
+  for (int k = 0; k < 60 * 20; ++k) {
+    const double now = k / 20.0 + 0.013;
+    for (; computed * period <= now; ++computed) check.addComputed(kThere.geoPoint(place(computed * period)));
+    check.addReference(kThere.geoPoint(place(now) + error));
+    out.insert(check.verdict());
+  }
+  return out;
+}
+
+TEST(PositionCheck, ATurnBetweenFewPositionsIsNoOtherEarth) {
+  for (const double period : {0.05, 0.1, 0.2, 0.3, 0.5, 1.0}) {
+    for (const double speed : {30.0, 60.0, 120.0, 220.0}) {
+      for (const double lateral_g : {0.0, 0.2, 1.0, 2.0, 3.0}) {
+        const auto seen = verdicts(period, speed, lateral_g, Vector3d::Zero());
+        EXPECT_EQ(seen.count(PositionCheck::Verdict::kDisagrees), 0U)
+            << "a position every " << period << " s at " << speed << " m/s, " << lateral_g << " g";
+        if (lateral_g < 1.0 || period < 0.2) {
+          EXPECT_EQ(seen.count(PositionCheck::Verdict::kAgrees), 1U)
+              << "a position every " << period << " s at " << speed << " m/s, " << lateral_g << " g";
+        }
+      }
+    }
+  }
+}
+
+TEST(PositionCheck, SeesWrongHeightBetweenFewPositions) {
+  for (const double speed : {60.0, 220.0}) {
+    EXPECT_EQ(verdicts(1.0, speed, 0.0, {0.0, 0.0, 0.2}).count(PositionCheck::Verdict::kDisagrees), 1U);
+  }
 }
 
 // A wrong radius of the sphere: 26 to 35 m at 39 km (docs/protocol.md 1.8) must not pass.

@@ -11,10 +11,12 @@
 namespace xplane_bridge::core {
 namespace {
 
+/// As one way: no dataref has answered.
 template <typename State>
 State decodeRows(const Datagram& datagram, std::uint32_t* valid = nullptr, SimulatorVersion version = kXPlane11) {
   const GroupDecoder<State> decoder(Transport::kData, version);
   RowStore rows;
+  rows.setOneWay(true);
   rows.update(datagram.data(), 100);
   State state;
   const std::vector<float> unknown(decoder.requests().size(), kNaNf);
@@ -190,6 +192,41 @@ TEST(StateDecoder, WithoutEngineCountNothingOfTheEnginesIsKnown) {
   }
   EngineStates s;
   EXPECT_EQ(decoder.decode(values, nullptr, 0, &s), 0U);
+}
+
+TEST(StateDecoder, OneWayRowsShowTheEnginesWithoutTheirCount) {
+  std::uint32_t valid = 0;
+  const Datagram d = Datagram::labelled("DATA*").row(25, {0.5F, 0.6F, 0, 0, 0, 0, 0, 0}).row(41, {90, kNaNf});
+  const EngineStates s = decodeRows<EngineStates>(d, &valid);
+  EXPECT_EQ(valid, EngineStates::kValidThrottleCommand) << "of row 41 not all is known";
+  EXPECT_EQ(s.count, 0);
+  EXPECT_EQ(s.throttle_command[1], 0.6F);
+  EXPECT_EQ(s.throttle_command[7], 0.0F);
+  EXPECT_EQ(s.n1[0], 90.0F);
+  EXPECT_TRUE(std::isnan(s.running[0])) << "no row carries it";
+}
+
+TEST(StateDecoder, RowsOfEnginesWaitForTheirCountWhereDatarefsAnswer) {
+  const GroupDecoder<EngineStates> decoder(Transport::kData, kXPlane11);
+  const std::vector<float> unknown(decoder.requests().size(), kNaNf);
+  RowStore rows;
+  rows.update(Datagram::labelled("DATA*").row(25, {0.5F, 0.6F, 0, 0, 0, 0, 0, 0}).data(), 100);
+  EngineStates s;
+  EXPECT_EQ(decoder.decode(unknown, &rows, 100, &s), 0U);
+  EXPECT_TRUE(std::isnan(s.throttle_command[0]));
+}
+
+TEST(StateDecoder, AnAircraftWithoutEnginesHasNoneInRows) {
+  const GroupDecoder<EngineStates> decoder(Transport::kData, kXPlane11);
+  std::vector<float> values(decoder.requests().size(), kNaNf);
+  values[0] = 0.0F;
+  ASSERT_EQ(decoder.requests()[0].path, "sim/aircraft/engine/acf_num_engines");
+  RowStore rows;
+  rows.setOneWay(true);
+  rows.update(Datagram::labelled("DATA*").row(25, {0, 0, 0, 0, 0, 0, 0, 0}).data(), 100);
+  EngineStates s;
+  EXPECT_EQ(decoder.decode(values, &rows, 100, &s), 0U);
+  EXPECT_TRUE(std::isnan(s.throttle_command[0]));
 }
 
 // --- equivalent deflections ---

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "recorded_flight.hpp"
@@ -10,7 +11,8 @@
 namespace xplane_bridge::core {
 namespace {
 
-constexpr std::int64_t kFrame = 16'666'667;  // [ns]
+constexpr std::int64_t kFrame = 16'666'667;    // [ns]
+constexpr std::int64_t kPeriod = 100'000'000;  // of a group at 10/s [ns]
 
 /// A datagram with these indices, value = index + 100 * frame.
 Datagram pairs(std::initializer_list<std::int32_t> indices, int frame = 0) {
@@ -53,7 +55,7 @@ TEST(RrefFrameAssembler, PiecesOfOneFrameAreJoined) {
 
 // 20 a second of 30 frames: two of three, for each index other ones.
 TEST(RrefFrameAssembler, ADatagramMayCompleteASampleAndBeginTheNext) {
-  RrefFrameAssembler frames(2, 0, RrefFrameAssembler::Options::joinedWithin(1.5 / 20.0));
+  RrefFrameAssembler frames(2, 0, RrefFrameAssembler::Options::atRate(20));
   int samples = 0;
   for (int frame = 0; frame < 300; ++frame) {
     Datagram datagram = Datagram::labelled("RREF,");
@@ -65,6 +67,22 @@ TEST(RrefFrameAssembler, ADatagramMayCompleteASampleAndBeginTheNext) {
   }
   EXPECT_EQ(samples, 200);
   EXPECT_EQ(frames.counters().incomplete, 0U);
+}
+
+// 50 a second of 60 frames: a frame that lacks an index is given up, as it would take its value from another frame.
+TEST(RrefFrameAssembler, NearTheFrameRateFramesWithAllIndicesAreTheSamples) {
+  RrefFrameAssembler frames(2, 0, RrefFrameAssembler::Options::atRate(50));
+  int samples = 0;
+  for (int frame = 0; frame < 300; ++frame) {
+    Datagram datagram = Datagram::labelled("RREF,");
+    if (frame % 6 != 0) datagram.pair(0, static_cast<float>(frame));
+    if (frame % 6 != 3) datagram.pair(1, static_cast<float>(frame));
+    if (!frames.add(datagram.rref(), frame * kFrame)) continue;
+    ++samples;
+    EXPECT_EQ(frames.values()[0], frames.values()[1]);
+  }
+  EXPECT_EQ(samples, 200);
+  EXPECT_EQ(frames.silentCount(), 0U);
 }
 
 TEST(RrefFrameAssembler, LostPieceLosesTheFrameAndNothingElse) {
@@ -84,14 +102,62 @@ TEST(RrefFrameAssembler, HalvesOfDifferentFramesAreNotJoined) {
 }
 
 TEST(RrefFrameAssembler, SlowGroupsMayComeInPieces) {
-  RrefFrameAssembler::Options options;
-  options.join_window = 0.15;
-  RrefFrameAssembler frames(3, 0, options);
+  RrefFrameAssembler frames(3, 0, RrefFrameAssembler::Options::atRate(10));
   for (int f = 0; f < 4; ++f) {
-    EXPECT_FALSE(frames.add(pairs({0}, f).rref(), f * 100'000'000LL));
-    EXPECT_FALSE(frames.add(pairs({1}, f).rref(), f * 100'000'000LL + kFrame));
-    EXPECT_TRUE(frames.add(pairs({2}, f).rref(), f * 100'000'000LL + 2 * kFrame));
+    EXPECT_FALSE(frames.add(pairs({0}, f).rref(), f * kPeriod));
+    EXPECT_FALSE(frames.add(pairs({1}, f).rref(), f * kPeriod + kFrame));
+    EXPECT_TRUE(frames.add(pairs({2}, f).rref(), f * kPeriod + 2 * kFrame));
   }
+}
+
+// Ten a second in six frames of each period: the last piece comes most of a period after the first.
+TEST(RrefFrameAssembler, SlowGroupsMayComeInPiecesInEveryFrame) {
+  RrefFrameAssembler frames(6, 0, RrefFrameAssembler::Options::atRate(10));
+  int samples = 0;
+  for (int f = 0; f < 60; ++f) samples += frames.add(pairs({f % 6}).rref(), f * kFrame) ? 1 : 0;
+  EXPECT_EQ(samples, 10);
+}
+
+TEST(RrefFrameAssembler, PiecesOfASlowGroupAreJoinedOverTheShorterPause) {
+  RrefFrameAssembler frames(2, 0, RrefFrameAssembler::Options::atRate(10));
+  for (int f = 0; f < 4; ++f) {
+    EXPECT_EQ(frames.add(pairs({0}, f).rref(), f * kPeriod), f > 0);
+    EXPECT_FALSE(frames.add(pairs({1}, f).rref(), f * kPeriod + 85'000'000));
+  }
+  EXPECT_EQ(frames.values(), (std::vector<float>{300, 201}));
+}
+
+/// Feeds each period's frame in two datagrams, {0, 1, 2} and {3, 4}, of which `comes` says whether it comes.
+/// @return how many samples there were; all of one frame each, else a test failure
+int feedInTwo(RrefFrameAssembler* frames, const std::function<bool(int frame, bool second)>& comes) {
+  int samples = 0;
+  for (int f = 0; f < 20; ++f) {
+    for (const bool second : {false, true}) {
+      if (!comes(f, second)) continue;
+      const Datagram datagram = second ? pairs({3, 4}, f) : pairs({0, 1, 2}, f);
+      if (!frames->add(datagram.rref(), f * kPeriod + (second ? 10'000 : 0))) continue;
+      ++samples;
+      EXPECT_EQ(frames->values()[0], 100.0F * static_cast<float>(f));
+      EXPECT_EQ(frames->receiveTime(), f * kPeriod);
+      if (frames->silentCount() == 0) {
+        EXPECT_EQ(frames->values()[4], 4.0F + 100.0F * static_cast<float>(f));
+      }
+    }
+  }
+  return samples;
+}
+
+TEST(RrefFrameAssembler, ALostBeginningDoesNotJoinTwoPeriods) {
+  RrefFrameAssembler frames(5, 0, RrefFrameAssembler::Options::atRate(10));
+  EXPECT_EQ(feedInTwo(&frames, [](int frame, bool second) { return frame != 4 || second; }), 19);
+  EXPECT_EQ(frames.counters().incomplete, 1U);
+}
+
+// As while a long list is still being asked for.
+TEST(RrefFrameAssembler, IndicesThatBeginLateDoNotJoinTwoPeriods) {
+  RrefFrameAssembler frames(5, 0, RrefFrameAssembler::Options::atRate(10));
+  EXPECT_GE(feedInTwo(&frames, [](int frame, bool second) { return frame >= 6 || !second; }), 16);
+  EXPECT_EQ(frames.silentCount(), 0U);
 }
 
 TEST(RrefFrameAssembler, SilentIndexIsLearntNamedAndDoesNotBlock) {

@@ -184,6 +184,11 @@ core::ClockFilter someClock() {
   late.sim_time = 100.0F + 0.02F * 8.0F;
   late.frame_period = 0.02F;
   clock.update(late);
+  for (int i = 0; i < 20; ++i) {  // for long enough to be fitted
+    late.receive_ns += kFrame;
+    late.sim_time += late.frame_period;
+    clock.update(late);
+  }
   return clock;
 }
 
@@ -199,7 +204,10 @@ void checkMission() {
       options.version = c.version;
       core::MissionAssembler<State> assembler(options);
       const Wire wire(State::kGroup, c, layout, pass,
-                      {{"count", {8.0}}, {"sim_time", {100.1}}, {"gauge_in_celsius", {0.0, 1.0, 0.0, 1.0}}});
+                      {{"count", {8.0}},
+                       {"sim_time", {100.1}},
+                       {"frame_period", {0.02}},
+                       {"gauge_in_celsius", {0.0, 1.0, 0.0, 1.0}}});
       core::RowStore rows;
       // Groups without rows: a datagram with none would be refused.
       if (wire.hasRows()) rows.update(wire.data().data(), kNow);
