@@ -148,6 +148,7 @@ void Actuation::onLink(const core::LinkStatus& status) {
       identity_.reset();
       traffic_.release("X-Plane began anew");
     }
+    if (!status.up()) jobs_.onEffect();
     link_status_ = status;
     failures_.onLink(status);
     path_.onLink(status);
@@ -178,7 +179,7 @@ void Actuation::onWatch(const core::RrefView& view) {
     disturbance_.forget();
     traffic_.release("X-Plane was restarted");
   }
-  failures_.onFrame(watch_);
+  failures_.onFrame(watch_, jobs_.placing());
   excitation_.onFrame(watch_);
   disturbance_.onFrame(watch_);
   if (identification_.running()) identification_.onFrame(watch_, conditions());
@@ -228,6 +229,7 @@ void Actuation::askIdentity() {
 
 void Actuation::onReset(const std::string& how) {
   ++resets_;
+  jobs_.onEffect();
   endSignals("the flight was reset");
   disturbance_.abort("the flight was reset");
   path_.onNewFlight(how);
@@ -363,7 +365,7 @@ std::optional<RequestResult> Actuation::windRefusal() {
 }
 
 IdentificationConditions Actuation::conditions() const {
-  return {path_.requestRefusal(), path_.mode().failsafe, !failures_.snapshot().labels.empty(), path_.commanded()};
+  return {path_.requestRefusal(), path_.mode().failsafe, failures_.brokenControls(), path_.commanded()};
 }
 
 Actuation::Identifying Actuation::identifySurfaces(const IdentificationRequest& request, const std::string& who,
@@ -385,7 +387,7 @@ RequestResult Actuation::setPaused(bool paused, const std::string& who) {
   // What X-Plane shows meanwhile is the pause of the reset itself, which ends with it.
   if (jobs_.resets()) return {core::ResultCode::kRefused, "reset_flight runs: wait for its event"};
   const core::LinkStatus status = link_->status();
-  if (!isUp(status) || !status.paused) return noLink();
+  if (!status.up() || !status.paused) return noLink();
   const PauseOutcome outcome = xplane_bridge::setPaused(link_, paused, options_.service_timeout, hooks_.stopping,
                                                         [this, &who] { setPausing(who); });
   if (outcome == PauseOutcome::kWasSo || outcome == PauseOutcome::kFollowed) {

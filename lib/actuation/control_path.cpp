@@ -367,7 +367,7 @@ void ControlPath::tick() {
   const double time = now();
   arbiter_.setTimeRunning(timeRuns(time), time);
   watchReleases();
-  if (isUp(link_status_) && time - last_override_refresh_ > kOverrideRefresh) {
+  if (link_status_.up() && time - last_override_refresh_ > kOverrideRefresh) {
     overrides_->refresh();
     last_override_refresh_ = time;
   }

@@ -60,7 +60,7 @@ core::ArbitratedControls ControlPath::withoutMissing(core::ArbitratedControls co
 
 /// Whether X-Plane can be asked, and has shown whether it is the one of before: what is written with a release is not
 /// for another.
-bool ControlPath::canGiveBack() const { return isUp(link_status_) && flight_shown_; }
+bool ControlPath::canGiveBack() const { return link_status_.up() && flight_shown_; }
 
 /// Whether anything is sent. What cannot be is left out of the controls.
 bool ControlPath::fly(core::ArbitratedControls* controls, double time) {

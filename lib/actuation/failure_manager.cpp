@@ -30,9 +30,9 @@ std::optional<double> expectedAngle(const core::SurfaceFailure& failure, double 
     case core::SurfaceFault::kStuck:
       return shown;
     case core::SurfaceFault::kHardOverUp:
-      return law ? std::optional<double>(law->low_deg) : std::nullopt;
+      return law ? std::optional<double>(law->fullyUp()) : std::nullopt;
     case core::SurfaceFault::kHardOverDown:
-      return law ? std::optional<double>(law->high_deg) : std::nullopt;
+      return law ? std::optional<double>(law->fullyDown()) : std::nullopt;
     case core::SurfaceFault::kCentred:
       return law ? std::optional<double>(law->neutral()) : std::nullopt;
     case core::SurfaceFault::kFloating:
@@ -109,10 +109,16 @@ void FailureManager::observe(const std::vector<std::string>& datarefs, const cor
   applySurfaces();
 }
 
-void FailureManager::onFrame(const core::FlightWatch& watch) {
+void FailureManager::onFrame(const core::FlightWatch& watch, bool placing) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   if (watch.sim_time > flight_.sim_time) countFrame();
-  flight_ = {watch.sim_time, watch.height_agl, watch.indicated_airspeed};
+  flight_ = {};
+  flight_.sim_time = watch.sim_time;
+  // A height or a speed that is not flown triggers nothing.
+  if (!placing && !watch.replay && link_status_.state != core::LinkState::kPaused) {
+    flight_.height_agl = watch.height_agl;
+    flight_.indicated_airspeed = watch.indicated_airspeed;
+  }
   replay_ = watch.replay;
   if (stopped_) return;
   for (const core::FailurePlan& plan : registry_.due(flight_)) carryOut(plan);
@@ -135,12 +141,27 @@ void FailureManager::onRestart() {
 
 void FailureManager::applySurfaces() {
   surfaces_->setFailures(registry_.drivenSurfaces());
-  bool disturbed = false;
+  const auto labels = registry_.labels();
+  surfaces_->setDisturbed(
+      std::any_of(labels.begin(), labels.end(), [this](const core::FailureLabel& label) { return disturbs(label); }));
+}
+
+/// X-Plane itself keeps surfaces from following.
+bool FailureManager::disturbs(const core::FailureLabel& label) const {
+  const auto own = registry_.datarefsOf(label.name);
+  return label.active &&
+         (core::touchesSurfaces(label.name) || std::any_of(own.begin(), own.end(), core::touchesSurfaces));
+}
+
+std::string FailureManager::brokenControls() const {
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   for (const core::FailureLabel& label : registry_.labels()) {
-    disturbed = disturbed || (label.active && core::touchesSurfaces(label.name));
+    if (!disturbs(label) && !(label.active && registry_.isDriven(label.name))) continue;
+    return label.name + (label.by_bridge ? " is broken: clear_failures repairs it"
+                                         : " is failed in the simulator: clear_failures with include_simulator "
+                                           "repairs it");
   }
-  for (const auto& dataref : own_datarefs_) disturbed = disturbed || core::touchesSurfaces(dataref);
-  surfaces_->setDisturbed(disturbed);
+  return "";
 }
 
 void FailureManager::carryOut(const core::FailurePlan& plan) {
@@ -156,7 +177,7 @@ void FailureManager::carryOut(const core::FailurePlan& plan) {
   }
   try {
     for (const std::string& dataref : plan.datarefs) {
-      overrides_->acquire(dataref, static_cast<float>(core::kFailedNow), false);
+      overrides_->acquire(OverrideHolder::kFailures, dataref, static_cast<float>(core::kFailedNow), false);
       undone_.erase(dataref);
     }
   } catch (const core::JournalError& error) {
@@ -196,7 +217,7 @@ void FailureManager::undo(const core::FailurePlan& plan) {
 void FailureManager::repair(const std::vector<std::string>& datarefs) {
   for (const std::string& dataref : datarefs) {
     try {
-      overrides_->release(dataref);
+      overrides_->release(OverrideHolder::kFailures, dataref);
     } catch (const core::JournalError& error) {
       report_(error.what(), "", false);
     }

@@ -72,7 +72,7 @@ std::optional<RequestResult> FailureManager::unanswered(const core::FailurePlan&
     answered = std::all_of(values.begin(), values.end(), [](const auto& value) { return value.has_value(); });
   }
   if (answered) return std::nullopt;
-  if (!isUp(link_->status())) return noLink();
+  if (!link_->status().up()) return noLink();
   if (!plan.surface) {
     return RequestResult{core::ResultCode::kNotSupported,
                          "this X-Plane does not answer to " + plan.datarefs.front() + ": is the name right?"};
@@ -99,7 +99,7 @@ RequestResult FailureManager::set(const core::FailureRequest& request, const std
   core::SimulatorVersion version;
   {
     std::lock_guard<core::HandlerMutex> lock(*mutex_);
-    if (!isUp(link_status_) || !link_status_.version.known()) {
+    if (!link_status_.up() || !link_status_.version.known()) {
       return {core::ResultCode::kNoLink, "X-Plane is not connected"};
     }
     version = version_;
@@ -141,7 +141,7 @@ FailureManager::ClearResult FailureManager::clear(const std::vector<std::string>
   }
   const bool driven = surfaces_->driving();
   // What is written to an X-Plane that is away is lost; only what is held is written again.
-  const bool up = isUp(link_status_);
+  const bool up = link_status_.up();
   const auto cleared = registry_.clear(labels, include_simulator && up);
   std::vector<std::string> datarefs;
   for (const core::FailurePlan& plan : cleared.undo) {

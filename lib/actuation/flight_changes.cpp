@@ -79,7 +79,7 @@ bool FlightChanges::beginningIsVisible() {
   return visible();
 }
 
-bool FlightChanges::isUp() const { return xplane_bridge::isUp(link_->status()); }
+bool FlightChanges::isUp() const { return link_->status().up(); }
 
 PauseOutcome FlightChanges::pause(bool paused, const std::string& who) {
   hooks_.pausing(who);

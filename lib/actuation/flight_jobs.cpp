@@ -47,7 +47,7 @@ bool FlightJobs::full() const {
 std::optional<RequestResult> FlightJobs::refusal() const {
   const core::LinkStatus status = link_->status();
   const std::int32_t version = status.version.number;
-  if (!isUp(status) || version == 0) return noLink();
+  if (!status.up() || version == 0) return noLink();
   if (version < kOldest) {
     return RequestResult{core::ResultCode::kNotSupported, "this is X-Plane " + std::to_string(version) +
                                                               ": its messages for this are not known before 11.00"};
@@ -62,6 +62,16 @@ std::optional<RequestResult> FlightJobs::refusal() const {
 std::string FlightJobs::movingCaller() const {
   std::lock_guard<std::mutex> lock(mutex_);
   return moving_caller_;
+}
+
+bool FlightJobs::placing() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return !moving_caller_.empty() && (resets_ || took_effect_);
+}
+
+void FlightJobs::onEffect() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  took_effect_ = running_;
 }
 
 bool FlightJobs::resets() const {
@@ -108,6 +118,7 @@ void FlightJobs::loop() {
     lock.lock();
     moving_caller_.clear();
     resets_ = false;
+    took_effect_ = false;
     running_ = false;
   }
   const std::deque<Job> waiting = std::exchange(jobs_, {});  // none is added any more

@@ -56,18 +56,6 @@ bool differ(const core::UndoOperations& a, const core::UndoOperations& b) {
 
 std::string joined(const std::set<std::string>& names) { return core::join(names, ", ", core::afterLastSlash); }
 
-/// By the cause for which they were left.
-std::string causes(const std::vector<core::JournalEntry>& entries) {
-  std::map<std::string, std::set<std::string>> names;
-  for (const core::JournalEntry& entry : entries) names[entry.left].insert(entry.id);
-  std::vector<std::string> out;
-  out.reserve(names.size());
-  for (const auto& [cause, ids] : names) {
-    out.push_back(joined(ids) + (cause.empty() ? " left by a run that crashed" : " left because " + cause));
-  }
-  return core::join(out);
-}
-
 }  // namespace
 
 const char* const kOverridePurpose = "override";
@@ -192,7 +180,9 @@ void OverrideManager::updateWatch() {
     if (!core::rowOfName(dataref)) wanted.insert(dataref);  // X-Plane does not show who holds a row
   }
   for (const auto& [dataref, acquired] : acquired_) {
-    if (acquired.refreshed && dataref != core::kSurfaceOverride) wanted.insert(dataref);
+    // SurfaceControl looks at its own in each frame.
+    const bool of_surfaces = acquired.holders == std::set<OverrideHolder>{OverrideHolder::kSurfaces};
+    if (acquired.refreshed && !of_surfaces) wanted.insert(dataref);
   }
   const std::vector<std::string> list(wanted.begin(), wanted.end());
   if (list == watched_) return;
@@ -324,34 +314,45 @@ void OverrideManager::setRequired(const std::vector<std::string>& wanted) {
   if (failed) std::rethrow_exception(failed);
 }
 
-bool OverrideManager::acquire(const std::string& dataref, float value, bool refreshed) {
+void OverrideManager::hold(OverrideHolder holder, const std::string& dataref, float value, bool refreshed) {
+  Acquired& acquired = acquired_[dataref];
+  acquired.value = value;
+  acquired.refreshed = refreshed;
+  acquired.holders.insert(holder);
+}
+
+bool OverrideManager::acquire(OverrideHolder holder, const std::string& dataref, float value, bool refreshed) {
   const Lock lock(*mutex_);
   if (required_.count(dataref) == 0 && !set(dataref, value)) return false;
-  acquired_[dataref] = {value, refreshed};
+  hold(holder, dataref, value, refreshed);
   updateWatch();
   return true;
 }
 
-void OverrideManager::acquire(const std::vector<std::string>& datarefs) {
+void OverrideManager::acquire(OverrideHolder holder, const std::vector<std::string>& datarefs) {
   const Lock lock(*mutex_);
   std::vector<core::DatarefWrite> missing;
   for (const std::string& dataref : datarefs) {
     if (required_.count(dataref) == 0) {
       missing.push_back({dataref, 1.0F});
     } else {
-      acquired_[dataref] = {};
+      hold(holder, dataref, 1.0F, true);
     }
   }
   const Outcome outcome = set(missing);
-  for (const core::DatarefWrite& each : outcome.set) acquired_[each.dataref] = {};
+  for (const core::DatarefWrite& each : outcome.set) hold(holder, each.dataref, each.value, true);
   updateWatch();
   if (outcome.failed) std::rethrow_exception(outcome.failed);
 }
 
-void OverrideManager::release(const std::string& dataref) {
+void OverrideManager::release(OverrideHolder holder, const std::string& dataref) {
   const Lock lock(*mutex_);
-  if (acquired_.erase(dataref) == 0) return;
-  giveBack(dataref);
+  const auto found = acquired_.find(dataref);
+  if (found == acquired_.end() || found->second.holders.erase(holder) == 0) return;
+  if (found->second.holders.empty()) {
+    acquired_.erase(found);
+    giveBack(dataref);
+  }
   updateWatch();
 }
 
@@ -387,6 +388,11 @@ void OverrideManager::startRelease(const std::string& dataref) { releasing_[data
 bool OverrideManager::releasesPending() const {
   const Lock lock(*mutex_);
   return !releasing_.empty();
+}
+
+bool OverrideManager::releasePending(const std::string& dataref) const {
+  const Lock lock(*mutex_);
+  return releasing_.count(dataref) != 0;
 }
 
 void OverrideManager::confirmReleases(double timeout_s) {
@@ -425,7 +431,7 @@ void OverrideManager::reportReleases(const std::string& released, const std::str
   if (!released.empty()) report_("released " + released, true);
   // It is tried again and again, but reported once.
   if (left.empty() || std::exchange(unreleased_, left) == left) return;
-  const bool up = isUp(link_->status());
+  const bool up = link_->status().up();
   const char* why = up ? " could not be seen released; it stays in the journal"
                        : " could not be released, because X-Plane went first, or is silent. If it still runs, the "
                          "next start releases it, or scripts/release_overrides";
@@ -450,7 +456,7 @@ bool OverrideManager::releaseAll(double timeout_s) {
   for (std::size_t i = 0; i < all.size(); ++i) (shown[i] ? done : left).insert(all[i]);
   if (const auto journal = link_->journal(); journal && !all.empty()) {
     journal->remove(entryIds(done));
-    const char* why = isUp(link_->status()) ? "X-Plane did not show it released" : "X-Plane went first";
+    const char* why = link_->status().up() ? "X-Plane did not show it released" : "X-Plane went first";
     if (!left.empty()) journal->leave(entryIds(left), why);
   }
   reportReleases(joined(done), joined(left));
@@ -459,29 +465,13 @@ bool OverrideManager::releaseAll(double timeout_s) {
   return left.empty();
 }
 
-bool OverrideManager::releaseLeftovers(double timeout_s) {
-  const auto journal = link_->journal();
-  if (!journal) return false;
-  const core::Deadline deadline(link_->clock(), timeout_s);
-  const std::vector<core::JournalEntry> all = journal->orphans(kOverridePurpose);
-  std::vector<core::UndoOperations> operations;
-  operations.reserve(all.size());
-  for (const core::JournalEntry& entry : all) operations.push_back(entry.undo);
-  core::dropPreparationsOfReleased(link_, &operations, timeout_s / 2.0);
-  const std::vector<bool> shown = core::undoEach(link_, operations, deadline.left());
-  std::vector<core::JournalEntry> done, left;
-  for (std::size_t i = 0; i < all.size(); ++i) (shown[i] ? done : left).push_back(all[i]);
-  // This run may have set one of them anew meanwhile: that entry is not theirs.
-  if (!done.empty()) journal->removeUndone(done);
-  const bool known = std::none_of(left.begin(), left.end(), [](const auto& entry) { return entry.left.empty(); });
-  if (!isUp(link_->status()) && known) unreleased_ = causes(left);  // the runs that left them have said so
-  reportReleases(causes(done), causes(left));
-  return left.empty();
-}
-
-bool OverrideManager::isRequired(const std::string& dataref) const {
+std::set<OverrideHolder> OverrideManager::holders(const std::string& dataref) const {
   const Lock lock(*mutex_);
-  return required_.count(dataref) != 0;
+  const auto acquired = acquired_.find(dataref);
+  std::set<OverrideHolder> out;
+  if (acquired != acquired_.end()) out = acquired->second.holders;
+  if (required_.count(dataref) != 0) out.insert(OverrideHolder::kControls);
+  return out;
 }
 
 std::vector<std::string> OverrideManager::active() const {

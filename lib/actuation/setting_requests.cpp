@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -19,6 +20,17 @@ constexpr std::size_t kShownOfName = 80;  // [characters] of a name that is too 
 
 // X-Plane keeps float32; integers come back exactly.
 float toleranceOf(float value) { return 1e-4F * std::max(1.0F, std::abs(value)); }
+
+/// What an override is held for, which set_dataref must not release, and how it comes to be given back; nullopt: no
+/// part of tx_node but set_dataref holds it.
+std::optional<std::string> useOf(const std::set<OverrideHolder>& holders) {
+  if (holders.count(OverrideHolder::kControls) != 0) return "flies by: leave its controls out of the commands";
+  if (holders.count(OverrideHolder::kSurfaces) != 0) {
+    return "drives the surfaces by: clear their failures, and end control/surfaces and excitations of surfaces";
+  }
+  if (holders.count(OverrideHolder::kTraffic) != 0) return "places that aircraft by: leave it out of traffic/command";
+  return std::nullopt;
+}
 
 }  // namespace
 
@@ -43,7 +55,7 @@ void SettingRequests::confirmLater(const std::vector<core::DatarefWrite>& writes
 
 RequestResult SettingRequests::writeAndConfirm(const std::vector<core::DatarefWrite>& writes, const std::string& what,
                                                const std::string& who) {
-  if (!isUp(link_->status())) return noLink();
+  if (!link_->status().up()) return noLink();
   const core::Deadline deadline(link_->clock(), timeout_);
   for (const core::DatarefWrite& write : writes) {
     const core::SendStatus sent = link_->write(write.dataref, write.value);
@@ -72,14 +84,18 @@ std::optional<RequestResult> SettingRequests::holdOverrides(const std::vector<co
   for (const core::DatarefWrite& write : writes) {
     const auto release = core::releaseOf(write.dataref);
     if (!release) continue;
-    if (write.value != release->value) {
-      set.push_back(write.dataref);
-    } else if (overrides_->isRequired(write.dataref)) {
-      return RequestResult{ResultCode::kRefused,
-                           write.dataref +
-                               " is what tx_node flies by: leave its controls out of the commands, and it is given "
-                               "back; or run scripts/release_overrides, which ends all flying"};
-    }
+    const std::set<OverrideHolder> holders = overrides_->holders(write.dataref);
+    const auto use = useOf(holders);
+    const bool sets = write.value != release->value;
+    if (sets) set.push_back(write.dataref);
+    // Set on after driving has ended, that of the surfaces would leave them standing.
+    if (!use || (sets && holders.count(OverrideHolder::kSurfaces) == 0)) continue;
+    if (!sets) overrides_->release(OverrideHolder::kRequest, write.dataref);  // from now on only the others hold it
+    return RequestResult{
+        ResultCode::kRefused,
+        write.dataref + " is what tx_node " + *use +
+            (sets ? ", and set it then: until it is given back, tx_node has it set already"
+                  : ", and it is given back; or run scripts/release_overrides, which ends all flying")};
   }
   // One that X-Plane does not have could never be seen released.
   if (!set.empty() && !link_->inLockstep()) {
@@ -93,9 +109,9 @@ std::optional<RequestResult> SettingRequests::holdOverrides(const std::vector<co
       const auto release = core::releaseOf(write.dataref);
       if (!release) continue;
       if (write.value != release->value) {
-        overrides_->acquire(write.dataref, write.value);
+        overrides_->acquire(OverrideHolder::kRequest, write.dataref, write.value);
       } else {
-        overrides_->release(write.dataref);
+        overrides_->release(OverrideHolder::kRequest, write.dataref);
       }
     }
   } catch (const core::JournalError& error) {
@@ -116,7 +132,7 @@ SettingRequests::Written SettingRequests::setDataref(const std::string& name, co
   } catch (const std::invalid_argument& error) {
     return {{ResultCode::kRefused, error.what()}, {}};
   }
-  if (!isUp(link_->status())) return {noLink(), {}};
+  if (!link_->status().up()) return {noLink(), {}};
   std::vector<core::DatarefWrite> writes;
   for (std::size_t i = 0; i < names.size(); ++i) writes.push_back({names[i], values[i]});
   Written out;
@@ -133,7 +149,7 @@ SettingRequests::Written SettingRequests::setDataref(const std::string& name, co
 }
 
 RequestResult SettingRequests::runCommand(const std::string& name) {
-  if (!isUp(link_->status())) return noLink();
+  if (!link_->status().up()) return noLink();
   const core::SendStatus sent = link_->command(name);
   if (sent == core::SendStatus::kNotEncoded) {
     return {ResultCode::kRefused, "name is \"" + name.substr(0, kShownOfName) +

@@ -155,7 +155,7 @@ void SurfaceControl::onSample() {
         report_("X-Plane drives the surfaces again", true);
       } else if (now() - state_since_ > kShownReleasedWait) {
         enter(State::kIdle);
-        report_("X-Plane still shows the surface override", false);
+        report_("X-Plane still shows the surface override: " + heldElsewhere(), false);
       }
       break;
   }
@@ -192,7 +192,7 @@ void SurfaceControl::take() {
   enter(State::kTaking);
   drive(0.0);  // the snapshot goes ahead of the override
   try {
-    if (overrides_->acquire(core::kSurfaceOverride)) {
+    if (overrides_->acquire(OverrideHolder::kSurfaces, core::kSurfaceOverride)) {
       drive(0.0);
       return;
     }
@@ -288,7 +288,7 @@ void SurfaceControl::checkLeft() {
 
 void SurfaceControl::giveBack() {
   try {
-    overrides_->release(core::kSurfaceOverride);
+    overrides_->release(OverrideHolder::kSurfaces, core::kSurfaceOverride);
   } catch (const core::JournalError& error) {
     report_(error.what(), false);
   }

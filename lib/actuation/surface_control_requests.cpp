@@ -147,7 +147,6 @@ std::string SurfaceControl::beginIdentification() {
   std::lock_guard<std::mutex> lock(mutex_);
   if (blocked_) return blocked_->text;
   if (state_ != State::kIdle || wanted()) return "the surfaces are driven one by one: end that first";
-  if (disturbed_) return "something of the controls is broken: clear the failures first";
   if (sample_.override_shown != 0.0) return blockReasonLocked();
   if (!core::mixingTerms(sample_.inputs).allFinite()) return "X-Plane does not show what moves the surfaces";
   identifying_ = true;
@@ -161,8 +160,7 @@ std::string SurfaceControl::identificationProblem() const {
   if (!identifying_) return "";
   if (!identification_lost_.empty()) return identification_lost_;
   if (state_ != State::kIdle || wanted()) return "the surfaces are driven one by one";
-  if (disturbed_) return "something of the controls is broken";
-  return sample_.override_shown == 0.0 ? "" : "another program has set override_control_surfaces";
+  return sample_.override_shown == 0.0 ? "" : heldElsewhere();
 }
 
 SurfaceControl::Identified SurfaceControl::concludeIdentification(bool save) {
@@ -195,15 +193,26 @@ SurfaceControl::Sticks SurfaceControl::sticks() const {
 
 // --- what is ---
 
+/// What keeps the surface override set where this does not.
+std::string SurfaceControl::heldElsewhere() const {
+  if (overrides_->holders(core::kSurfaceOverride).count(OverrideHolder::kRequest) != 0) {
+    return "set_dataref has set override_control_surfaces: set it to 0 by set_dataref first";
+  }
+  if (overrides_->releasePending(core::kSurfaceOverride)) {
+    return "tx_node's release of override_control_surfaces is not shown yet, and is repeated; where that lasts, "
+           "another "
+           "program sets it and must give it back";
+  }
+  return "another program has set override_control_surfaces and must give it back";
+}
+
 std::string SurfaceControl::blockReasonLocked() const {
   if (blocked_) return blocked_->text;
   if (state_ == State::kTaking || state_ == State::kDriving) return "";
   if (state_ == State::kReleasing && driver_) return "";
   if (now() < not_before_) return "X-Plane did not let the surfaces be taken over a moment ago";
   if (sample_.override_shown != 0.0) {
-    return std::isfinite(sample_.override_shown)
-               ? std::string("another program has set override_control_surfaces and must give it back")
-               : std::string("X-Plane does not show its surfaces");
+    return std::isfinite(sample_.override_shown) ? heldElsewhere() : "X-Plane does not show its surfaces";
   }
   return watch_.refusal();
 }

@@ -137,7 +137,7 @@ std::string SurfaceIdentification::beyondLimits(const core::FlightWatch& watch) 
 std::string SurfaceIdentification::whyNot(const core::FlightWatch& watch, const IdentificationConditions& now) const {
   if (now.blocked) return now.blocked->text;
   if (now.failsafe) return "the failsafe flies: its source must be back, or a mode asked for";
-  if (now.broken) return "a failure is set: clear_failures first";
+  if (!now.broken.empty()) return now.broken;
   return beyondLimits(watch);
 }
 

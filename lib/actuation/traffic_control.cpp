@@ -28,7 +28,7 @@ TrafficControl::TrafficControl(core::SimulatorPort* link, OverrideManager* overr
 
 std::string TrafficControl::command(const std::vector<core::TrafficPose>& poses, double sim_time) {
   if (const auto wrong = core::check(poses)) return *wrong;
-  if (!isUp(link_->status())) return noLink().text;
+  if (!link_->status().up()) return noLink().text;
   const Lock lock(*mutex_);
   std::set<int> wanted;
   std::vector<int> taken, given;
@@ -39,7 +39,7 @@ std::string TrafficControl::command(const std::vector<core::TrafficPose>& poses,
       continue;
     }
     given.push_back(it->first);
-    overrides_->release(core::trafficOverride(it->first));
+    overrides_->release(OverrideHolder::kTraffic, core::trafficOverride(it->first));
     it = flown_.erase(it);
   }
   for (auto it = lost_.begin(); it != lost_.end();) it = wanted.count(*it) != 0 ? std::next(it) : lost_.erase(it);
@@ -75,7 +75,7 @@ std::string TrafficControl::take(const std::vector<core::TrafficPose>& poses, st
   if (wanted.empty()) return "";
   std::string refusal;
   try {
-    overrides_->acquire(names);
+    overrides_->acquire(OverrideHolder::kTraffic, names);
   } catch (const core::JournalError& error) {
     refusal = core::whyNotChanged(error);
   }
@@ -142,7 +142,7 @@ void TrafficControl::release(const std::string& why) {
   const Lock lock(*mutex_);
   if (flown_.empty()) return;
   const std::vector<int> given = numbers();
-  for (const int number : given) overrides_->release(core::trafficOverride(number));
+  for (const int number : given) overrides_->release(OverrideHolder::kTraffic, core::trafficOverride(number));
   forget();
   report_("traffic: " + listed(given) + " given back: " + why, true);
 }

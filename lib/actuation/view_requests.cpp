@@ -79,7 +79,7 @@ RequestResult ViewRequests::setView(const core::ViewWish& wish, const std::strin
 }
 
 RequestResult ViewRequests::setViewLocked(const core::ViewWish& wish) {
-  if (!isUp(link_->status())) return noLink();
+  if (!link_->status().up()) return noLink();
   const std::string problem = remember(wish.field_of_view_deg != 0.0);
   if (!problem.empty()) return {ResultCode::kTimeout, problem};
   const Eigen::Quaterniond wanted = core::orientationOf(wish);
@@ -206,7 +206,7 @@ bool ViewRequests::giveBackLocked(double timeout_s) {
     journal->removeUndone({*entry});
     return true;
   }
-  const bool up = isUp(link_->status());
+  const bool up = link_->status().up();
   journal->leave({kEntry}, up ? "X-Plane did not show the view given back" : "X-Plane went first");
   return false;
 }

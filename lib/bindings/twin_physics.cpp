@@ -5,7 +5,7 @@ namespace {
 
 constexpr double kSectionArea = (1.0 / 3.0) / (0.75 * 0.75);
 constexpr double kInflowLag = 0.04;  // [s]
-constexpr double kFloatPerAlpha = -0.5;
+constexpr double kFloatPerAlpha = 0.5;
 constexpr double kFloatRate = 90.0;  // [deg/s]
 constexpr double kStandardPa = 101325.0;
 constexpr double kFiresAbove = 0.1;  // of the rated speed
@@ -128,13 +128,13 @@ void SurfaceActuator::stepBroken(const SurfaceOrder& order, double target_deg, d
       approach(0.0, rate_deg_s * dt);
       break;
     case SurfaceFault::kFullUp:
-      approach(minimum_deg, rate_deg_s * dt);
+      approach(fully_up_deg, rate_deg_s * dt);
       break;
     case SurfaceFault::kFullDown:
-      approach(maximum_deg, rate_deg_s * dt);
+      approach(fully_down_deg, rate_deg_s * dt);
       break;
     case SurfaceFault::kFloating: {
-      const double trailing = rudder ? 0.0 : kFloatPerAlpha * alpha_deg;
+      const double trailing = rudder ? 0.0 : kFloatPerAlpha * up_sign * alpha_deg;
       approach(clip(trailing, minimum_deg, maximum_deg), kFloatRate * dt);
       break;
     }

@@ -45,8 +45,9 @@ class FailureManager {
 
   // What drives it.
   void onLink(const core::LinkStatus& status);
-  /// Every frame: triggers.
-  void onFrame(const core::FlightWatch& watch);
+  /// Every frame: triggers. `placing`: the aircraft is on its way to another flight, whose heights and speeds are not
+  /// flown; those of a pause and of a replay are not either.
+  void onFrame(const core::FlightWatch& watch, bool placing);
   /// The next frame is of another X-Plane, or of another flight after a gap: all end, armed ones too.
   void onRestart();
   /// At least ten times a second.
@@ -72,6 +73,8 @@ class FailureManager {
   ClearResult clear(const std::vector<std::string>& names, bool include_simulator, const std::string& who);
 
   FailureSnapshot snapshot() const;
+  /// What is broken of the controls, and what repairs it, in words; empty: nothing.
+  std::string brokenControls() const;
 
  private:
   /// A failure that came true, until X-Plane has shown it.
@@ -110,6 +113,7 @@ class FailureManager {
   void giveUp(const std::string& name, const std::string& why);
   void end(bool driven_only, const std::string& why);
   void applySurfaces();
+  bool disturbs(const core::FailureLabel& label) const;
   void observe(const std::vector<std::string>& datarefs, const core::RrefView& view);
   void watchOwn();
   void watch(core::Subscription* subscription, core::RrefGroup group);

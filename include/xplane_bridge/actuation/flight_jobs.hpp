@@ -57,6 +57,11 @@ class FlightJobs {
   std::optional<RequestResult> refusal() const;
   /// The caller of the job that runs, if that places the aircraft or loads files; empty: none does.
   std::string movingCaller() const;
+  /// That job has the aircraft on its way to another flight: reset_flight from its beginning, a load from its first
+  /// effect, as X-Plane flies on where it has no such file.
+  bool placing() const;
+  /// The flight began anew, or X-Plane does not answer: a load that runs takes effect.
+  void onEffect();
   /// reset_flight runs: X-Plane is paused for it, and let go on at its end.
   bool resets() const;
   /// The one at it ends where it is, X-Plane resumed if it was paused for it; the others are reported as not begun.
@@ -85,6 +90,7 @@ class FlightJobs {
   std::string moving_caller_;
   bool running_ = false;
   bool resets_ = false;
+  bool took_effect_ = false;  // the one that runs
   core::ThreadSeat seat_;
   std::thread thread_;  // last: it uses all of the others
 };

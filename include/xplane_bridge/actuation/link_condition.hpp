@@ -7,11 +7,6 @@
 
 namespace xplane_bridge {
 
-/// X-Plane answers: what is sent now acts, and can be read back.
-inline bool isUp(const core::LinkStatus& status) {
-  return status.state == core::LinkState::kConnected || status.state == core::LinkState::kPaused;
-}
-
 /// What is added to a failure while it does not run: " (it is paused)", " (the link is LOST)"; else nothing.
 inline std::string linkCondition(const core::LinkStatus& status) {
   if (status.state == core::LinkState::kPaused) return " (it is paused)";

@@ -28,6 +28,15 @@ struct Retries {
   }
 };
 
+/// Which part of tx_node has set an override: it stays set until each that holds it has given it back.
+enum class OverrideHolder : std::uint8_t {
+  kControls,  ///< the stick and motors, by OverrideManager::setRequired()
+  kSurfaces,
+  kTraffic,
+  kFailures,
+  kRequest,  ///< set_dataref
+};
+
 /// The overrides this node has set in X-Plane, and nothing else's: each is in the journal before it is set, and taken
 /// out after it is released and read back. Thread-safe. Functions that wait for X-Plane say so; those that write to the
 /// journal throw core::JournalError, but for releasedByOthers() and refresh(), which report it.
@@ -44,13 +53,13 @@ class OverrideManager {
   /// is set.
   /// A DATA row (core::rowName()) is only kept in the journal; released, it gets -999, which X-Plane does not confirm.
   void setRequired(const std::vector<std::string>& wanted);
-  /// Sets one, until release() or the end of the node, whatever setRequired() says. Not only overrides: whatever is 0
-  /// (or core::releaseOf()) where no client sets it. Without `refreshed`, refresh() leaves it alone, so that it can be
-  /// taken back in the simulator. Returns whether it was set: as in setRequired().
-  bool acquire(const std::string& dataref, float value = 1.0F, bool refreshed = true);
+  /// Sets one, until the holder's release() or the end of the node, whatever setRequired() and other holders do. Not
+  /// only overrides: whatever is 0 (or core::releaseOf()) where no client sets it. Without `refreshed`, refresh()
+  /// leaves it alone, so that it can be taken back in the simulator. Returns whether it was set: as in setRequired().
+  bool acquire(OverrideHolder holder, const std::string& dataref, float value = 1.0F, bool refreshed = true);
   /// The same of several overrides, with one write to the disk. Where one cannot be noted the others are set before it
   /// throws; active() has those that are.
-  void acquire(const std::vector<std::string>& datarefs);
+  void acquire(OverrideHolder holder, const std::vector<std::string>& datarefs);
   /// What is to be written right before `dataref`, which is set, is released: by this node, and, as far as
   /// recordPreparations() has brought it into the journal, by its guardian, its next start and
   /// scripts/release_overrides. It is not read back.
@@ -61,14 +70,15 @@ class OverrideManager {
   void forgetPreparations();
   /// Another process has given everything back: nothing is set any more. Released once more, and confirmed.
   void giveBackAll();
-  /// Gives one back that acquire() has set; another one stays as it is.
-  void release(const std::string& dataref);
+  /// Gives one back that acquire() has set for this holder; one that it does not hold, or another one holds, stays as
+  /// it is.
+  void release(OverrideHolder holder, const std::string& dataref);
   /// Sends all that are set once more: a datagram may have been lost, X-Plane may have been restarted. Not those that
   /// X-Plane shows released.
   void refresh();
   /// What another client has released (the panic tool, a user's script) since the last call, after X-Plane had shown it
   /// set. Its journal entry goes, and it is not set again by itself. Returns those of setRequired(); what acquire() has
-  /// set is reported and let go as well, but for the surface override, which its holder watches.
+  /// set is reported and let go as well, but for what only OverrideHolder::kSurfaces holds, which watches it itself.
   std::vector<std::string> releasedByOthers();
   /// X-Plane does not show who holds a DATA row: once a second, rows whose journal entries another process has taken
   /// out count as released by it, in the next releasedByOthers(). Reads the disk, without holding anything up.
@@ -77,18 +87,20 @@ class OverrideManager {
   void forgetShown();
   /// True while a release has not been read back.
   bool releasesPending() const;
+  /// The same of one.
+  bool releasePending(const std::string& dataref) const;
   /// Reads pending releases back, sending them again; one that X-Plane does not show is tried apart from those that are
   /// new, a few times at once, then every few seconds. Waits up to `timeout_s`.
   void confirmReleases(double timeout_s);
   /// Releases everything; nothing is set after that. Waits up to `timeout_s`. Returns whether X-Plane has shown all of
   /// it; what it has not stays in the journal.
   bool releaseAll(double timeout_s);
-  /// Releases what earlier runs have left: by a crash, or because X-Plane had gone before them. Waits up to
-  /// `timeout_s`. Returns whether nothing is left.
+  /// Releases what earlier runs have left: by a crash, or because X-Plane had gone before them. What this run has set
+  /// meanwhile stays set. Waits up to `timeout_s`. Returns whether nothing is left.
   bool releaseLeftovers(double timeout_s);
 
-  /// Whether setRequired() has it set: what is flown goes by it.
-  bool isRequired(const std::string& dataref) const;
+  /// Which parts of tx_node hold it; empty: it is not set.
+  std::set<OverrideHolder> holders(const std::string& dataref) const;
   /// Set now, by name; those that refresh() repeats.
   std::vector<std::string> active() const;
 
@@ -96,6 +108,7 @@ class OverrideManager {
   struct Acquired {
     float value = 1.0F;
     bool refreshed = true;
+    std::set<OverrideHolder> holders;
   };
 
   /// What X-Plane shows of one that is set.
@@ -129,6 +142,7 @@ class OverrideManager {
   Outcome set(const std::vector<core::DatarefWrite>& wanted);
   bool set(const std::string& dataref, float value);
   void resend(const std::string& dataref, float value);
+  void hold(OverrideHolder holder, const std::string& dataref, float value, bool refreshed);
   void giveBack(const std::string& dataref);
   void updateWatch();
   void onShown(const core::RrefView& view);

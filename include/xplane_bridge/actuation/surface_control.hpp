@@ -206,6 +206,7 @@ class SurfaceControl {
   void loadModel(const std::string& exactly);
   std::string keepModel();
   void saveModel();
+  std::string heldElsewhere() const;
   std::string blockReasonLocked() const;
   std::string blockReasonForLocked(std::size_t surface) const;
   std::string unknownReasonLocked(std::size_t surface) const;

@@ -28,7 +28,7 @@ struct IdentificationRequest {
 struct IdentificationConditions {
   std::optional<RequestResult> blocked;  ///< the refusal, as nothing may be sent to X-Plane now; nullopt: it may
   bool failsafe = false;                 ///< the source that flies is silent
-  bool broken = false;                   ///< a failure is active, or waits for its trigger
+  std::string broken;                    ///< of the controls, and what repairs it, in words; empty: nothing
   core::ChannelSet commanded;            ///< channels that are commanded now
 };
 

@@ -138,6 +138,9 @@ struct SurfaceMirror {
     actuator.minimum_deg = constant(spec, "minimum_deg");
     actuator.maximum_deg = constant(spec, "maximum_deg");
     actuator.rate_deg_s = constant(spec, "rate_deg_s");
+    actuator.up_sign = constant(spec, "up_sign");
+    actuator.fully_up_deg = constant(spec, "fully_up_deg");
+    actuator.fully_down_deg = constant(spec, "fully_down_deg");
     const Object kind = attribute(spec.get(), "kind");
     actuator.rudder = text(attribute(kind.get(), "value").get()) == "rudder";
     mirror.add("position_deg", actuator.position_deg);

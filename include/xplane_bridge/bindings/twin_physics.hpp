@@ -81,6 +81,7 @@ struct SurfaceOrder {
 /// actuators.SurfaceActuator.
 struct SurfaceActuator {
   double minimum_deg = 0.0, maximum_deg = 0.0, rate_deg_s = 0.0;
+  double up_sign = 0.0, fully_up_deg = 0.0, fully_down_deg = 0.0;
   bool rudder = false;
   double position_deg = 0.0, effective_deg = 0.0;
   std::optional<double> stuck_deg;

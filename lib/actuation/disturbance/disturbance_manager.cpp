@@ -25,10 +25,7 @@ constexpr const char* kNotYet = "the wind of before the last disturbance could n
 constexpr const char* kEntry = "override:the wind before a disturbance";
 
 /// X-Plane answers, or is late with a frame: what it was sent stays.
-bool isThere(const core::LinkStatus& status) {
-  return status.state == core::LinkState::kConnected || status.state == core::LinkState::kPaused ||
-         status.state == core::LinkState::kStale;
-}
+bool isThere(const core::LinkStatus& status) { return status.up() || status.state == core::LinkState::kStale; }
 
 std::string described(const DisturbanceLabel& label) {
   return "disturbance " + std::to_string(label.id) + ", " + core::toString(label.spec->kind);

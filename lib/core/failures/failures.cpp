@@ -238,7 +238,6 @@ void FailureRegistry::add(const FailureRequest& request, const FailurePlan& plan
   entry.trigger = static_cast<FailureTrigger>(request.trigger);
   entry.trigger_value = request.trigger_value;
   if (entry.trigger == FailureTrigger::kAtSimTime) entry.trigger_value += now.sim_time;
-  entry.driven = plan.datarefs.empty();
   entries_[plan.name] = entry;
 }
 
@@ -270,7 +269,6 @@ bool FailureRegistry::observe(const std::string& dataref, double value, double s
     const auto& names = entry.plan.datarefs;
     // One that is armed only is not what X-Plane shows.
     if (!entry.active || std::find(names.begin(), names.end(), dataref) == names.end()) continue;
-    if (entry.driven) return false;
     if (failed) {
       entry.shown.insert(dataref);
     } else {
@@ -335,26 +333,26 @@ std::vector<FailureLabel> FailureRegistry::labels() const {
 std::vector<SurfaceFailure> FailureRegistry::drivenSurfaces() const {
   std::vector<SurfaceFailure> out;
   for (const auto& [name, entry] : entries_) {
-    if (entry.active && entry.driven && entry.plan.surface) out.push_back(*entry.plan.surface);
+    if (entry.active && entry.driven()) out.push_back(*entry.plan.surface);
   }
   return out;
 }
 
 bool FailureRegistry::isDriven(const std::string& name) const {
   const auto it = entries_.find(name);
-  return it != entries_.end() && it->second.driven;
+  return it != entries_.end() && it->second.driven();
 }
 
 std::vector<std::string> FailureRegistry::datarefsOf(const std::string& name) const {
   const auto it = entries_.find(name);
-  if (it == entries_.end() || !it->second.active || it->second.driven) return {};
+  if (it == entries_.end() || !it->second.active) return {};
   return it->second.plan.datarefs;
 }
 
 void FailureRegistry::useDriver(const std::string& name, double sim_time, std::optional<double> stuck_deg) {
   const auto it = entries_.find(name);
   if (it == entries_.end() || !it->second.plan.surface) return;
-  it->second.driven = true;
+  it->second.plan.datarefs.clear();  // X-Plane's own failure is another's from here on
   it->second.confirmed = false;
   it->second.since = sim_time;
   SurfaceFailure& failure = *it->second.plan.surface;

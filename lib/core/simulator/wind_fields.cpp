@@ -23,7 +23,8 @@ double oneMinusCosine(double at, double length) {
 }
 
 double logarithmicShear(double speed, double roughness, double height) {
-  return speed * std::log(std::clamp(height, kLowest, kHighest) / roughness) / std::log(kWindHeight / roughness);
+  const double lowest = std::max(kLowest, roughness);  // below it, the logarithm blows the other way
+  return speed * std::log(std::clamp(height, lowest, kHighest) / roughness) / std::log(kWindHeight / roughness);
 }
 
 double linearShear(double speed, double gradient, double height) { return speed + gradient * (height - kWindHeight); }

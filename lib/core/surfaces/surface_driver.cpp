@@ -107,9 +107,9 @@ double SurfaceDriver::target(const Driven& d, const MixingVector& terms) const {
     case SurfaceFault::kStuck:
       return d.stuck_deg;
     case SurfaceFault::kHardOverUp:
-      return d.law ? d.law->low_deg : d.now_deg;
+      return d.law ? d.law->fullyUp() : d.now_deg;
     case SurfaceFault::kHardOverDown:
-      return d.law ? d.law->high_deg : d.now_deg;
+      return d.law ? d.law->fullyDown() : d.now_deg;
     case SurfaceFault::kCentred:
       return neutral;
     case SurfaceFault::kReduced:
@@ -123,11 +123,10 @@ double SurfaceDriver::target(const Driven& d, const MixingVector& terms) const {
 }
 
 double SurfaceDriver::floating(const Driven& d, const FlowAngles& flow, double dt) const {
-  // Flow from below lifts the trailing edge (negative here); flow from the right pushes a rudder's to the left
-  // (negative).
+  // Flow from below lifts the trailing edge; flow from the right pushes a rudder's to the left.
   const bool rudder = surfaceTable()[d.surface].kind == SurfaceKind::kRudder;
   const double angle = rudder ? flow.beta_deg : flow.alpha_deg;
-  const double trail = std::isfinite(angle) ? -options_.floating_gain * angle : 0.0;
+  const double trail = std::isfinite(angle) ? upSign(d.surface) * options_.floating_gain * angle : 0.0;
   const double bounded = d.law ? std::clamp(trail, d.law->low_deg, d.law->high_deg) : trail;
   return d.now_deg + (bounded - d.now_deg) * -std::expm1(-dt / options_.floating_time);
 }

@@ -74,6 +74,13 @@ std::optional<std::size_t> surfaceNumber(const std::string& name) {
   return static_cast<std::size_t>(it - table.begin());
 }
 
+double upSign(std::size_t surface) {
+  const SurfaceKind kind = surfaceTable()[surface].kind;
+  const bool opens =
+      kind == SurfaceKind::kSpoiler || kind == SurfaceKind::kSpeedbrake || kind == SurfaceKind::kYawBrake;
+  return opens ? 1.0 : -1.0;
+}
+
 SurfaceCommandResult checkSurfaceCommand(const std::vector<std::string>& names,
                                          const std::vector<float>& deflections_deg) {
   SurfaceCommandResult out;

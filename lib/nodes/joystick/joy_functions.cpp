@@ -7,6 +7,7 @@
 
 #include "xplane_bridge/ClearFailures.h"
 #include "xplane_bridge/RunCommand.h"
+#include "xplane_bridge/ServiceResult.h"
 #include "xplane_bridge/SetFailure.h"
 #include "xplane_bridge/SetView.h"
 
@@ -17,6 +18,12 @@ constexpr std::size_t kMostWaiting = 8;
 constexpr Range<int> kButtons{0, 255};
 const std::vector<std::string> kKinds = {"pause", "command", "view", "failure"};
 const std::vector<std::string> kViews = {"forward", "rear", "down", "cockpit"};  // in the order of SetView's numbers
+
+/// Also what X-Plane has not shown in time, or not as it should, may stand, or come true when it goes on.
+bool mayBeBroken(const ServiceResult& result) {
+  return result.code == ServiceResult::OK || result.code == ServiceResult::ACCEPTED ||
+         result.code == ServiceResult::TIMEOUT;
+}
 
 JoyFunction functionOf(const std::string& name, const ParamLoader& in) {
   JoyFunction out;
@@ -110,15 +117,22 @@ std::string JoyFunctions::setView(const JoyFunction& function) {
 }
 
 std::string JoyFunctions::toggleFailure(const JoyFunction& function) {
-  if (broken_.count(function.name) != 0) {
-    ClearFailures message;
-    message.request.names = {function.name};
-    std::string problem = call("clear_failures", &message);
-    if (!problem.empty()) return problem;
-    // Whatever the answer: what another client has repaired is refused, and would be so at every press.
-    broken_.erase(function.name);
-    return message.response.success ? "" : message.response.result.message;
-  }
+  const auto broken = broken_.find(function.name);
+  if (broken == broken_.end()) return setFailure(function);
+  ClearFailures message;
+  message.request.names = {function.name};
+  std::string problem = call("clear_failures", &message);
+  if (!problem.empty()) return problem;
+  // tx_node has given up what X-Plane did not show in time: nothing was broken that this press could repair.
+  const bool given_up =
+      broken->second == ServiceResult::TIMEOUT && message.response.result.code == ServiceResult::REFUSED;
+  // Whatever the answer: what another client has repaired is refused, and would be so at every press.
+  broken_.erase(broken);
+  if (given_up) return setFailure(function);
+  return message.response.success ? "" : message.response.result.message;
+}
+
+std::string JoyFunctions::setFailure(const JoyFunction& function) {
   SetFailure message;
   message.request.name = function.name;
   message.request.kind = function.failure;
@@ -126,9 +140,9 @@ std::string JoyFunctions::toggleFailure(const JoyFunction& function) {
   message.request.value = function.value.value_or(0.0F);
   std::string problem = call("set_failure", &message);
   if (!problem.empty()) return problem;
-  if (!message.response.success) return message.response.result.message;
-  broken_.insert(function.name);
-  return "";
+  const ServiceResult& result = message.response.result;
+  if (mayBeBroken(result)) broken_[function.name] = result.code;
+  return message.response.success ? "" : result.message;
 }
 
 }  // namespace xplane_bridge

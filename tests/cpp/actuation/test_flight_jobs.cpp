@@ -100,12 +100,16 @@ TEST_F(FlightJobsTest, WhoMovesTheAircraftIsKnownForAsLong) {
   jobs_.loadAircraft(kPath, 0, 1, "node/load_aircraft");
   at_it_.get_future().wait();
   EXPECT_EQ(jobs_.movingCaller(), "node/load_aircraft");
+  EXPECT_FALSE(jobs_.placing()) << "X-Plane may not have it";
+  jobs_.onEffect();
+  EXPECT_TRUE(jobs_.placing());
   go_on_.set_value();
   EXPECT_EQ(outcomes(1)[0].text, std::string("loaded ") + kPath + ": OTHER");
   EXPECT_FALSE(reset_seen_) << "no load is a reset";
   jobs_.saveSituation("Output/a.sit", 2, "node/save_state");
   outcomes(2);
   EXPECT_EQ(jobs_.movingCaller(), "") << "saving moves nothing";
+  EXPECT_FALSE(jobs_.placing());
   go_on_ = std::promise<void>();
 }
 

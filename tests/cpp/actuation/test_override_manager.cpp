@@ -71,7 +71,7 @@ TEST_F(OverrideManagerTest, JournalComesBeforeTheWrite) {
 }
 
 TEST_F(OverrideManagerTest, WhatIsHeldOnIsNotSaidToBeGivenBack) {
-  manager_.acquire(kJoystick);  // by set_dataref
+  manager_.acquire(OverrideHolder::kRequest, kJoystick);  // by set_dataref
   manager_.setRequired({kJoystick, kThrottles});
   manager_.setRequired({});
   EXPECT_EQ(sim_.value(kJoystick), 1.0F);
@@ -95,7 +95,7 @@ TEST_F(OverrideManagerTest, WhatIsNotRequiredAnyMoreIsGivenBack) {
 TEST_F(OverrideManagerTest, NothingIsSetWithoutAJournal) {
   sim_.forgetPeer();
   manager_.setRequired({kJoystick});
-  EXPECT_FALSE(manager_.acquire(kThrottles));
+  EXPECT_FALSE(manager_.acquire(OverrideHolder::kRequest, kThrottles));
   EXPECT_TRUE(manager_.active().empty());
   EXPECT_TRUE(sim_.messages().empty());
   EXPECT_TRUE(reports_.empty());
@@ -104,7 +104,7 @@ TEST_F(OverrideManagerTest, NothingIsSetWithoutAJournal) {
 TEST_F(OverrideManagerTest, NothingIsSetThatCannotBeWrittenDown) {
   sim_.breakJournal();
   EXPECT_THROW(manager_.setRequired({kJoystick}), core::JournalError);
-  EXPECT_THROW(manager_.acquire(kThrottles), core::JournalError);
+  EXPECT_THROW(manager_.acquire(OverrideHolder::kRequest, kThrottles), core::JournalError);
   EXPECT_TRUE(sim_.messages().empty());
   EXPECT_TRUE(manager_.active().empty());
   sim_.breakJournal(false);
@@ -124,7 +124,8 @@ TEST_F(OverrideManagerTest, OneThatCannotBeWrittenDownKeepsNoOtherFromBeingSet) 
   EXPECT_EQ(reports_, (Reports{{"set override_throttles", true},
                                {"set override_joystick", true},
                                {"gave back override_throttles", true}}));
-  EXPECT_THROW(manager_.acquire(Names{kThrottles, kFailure, kJoystick}), core::JournalTakenError);
+  EXPECT_THROW(manager_.acquire(OverrideHolder::kTraffic, Names{kThrottles, kFailure, kJoystick}),
+               core::JournalTakenError);
   EXPECT_EQ(manager_.active(), (Names{kJoystick, kThrottles}));
   EXPECT_EQ(sim_.value(kThrottles), 1.0F);
   manager_.setRequired({});
@@ -141,12 +142,12 @@ TEST_F(OverrideManagerTest, SeveralAreWrittenDownBeforeTheFirstIsSent) {
 // ---------------------------------------------------------------------------------------- acquire() and release()
 
 TEST_F(OverrideManagerTest, AcquiredIsIndependentOfWhatIsRequired) {
-  EXPECT_TRUE(manager_.acquire(kJoystick));
+  EXPECT_TRUE(manager_.acquire(OverrideHolder::kRequest, kJoystick));
   manager_.setRequired({kJoystick});
   manager_.setRequired({});
   EXPECT_EQ(sim_.value(kJoystick), 1.0F);
   EXPECT_FALSE(manager_.releasesPending());
-  manager_.release(kJoystick);
+  manager_.release(OverrideHolder::kRequest, kJoystick);
   EXPECT_EQ(sim_.value(kJoystick), 0.0F);
   EXPECT_TRUE(manager_.releasesPending());
   EXPECT_EQ(sim_.writes(), (Writes{{kJoystick, 1.0F}, {kJoystick, 0.0F}}));
@@ -154,26 +155,44 @@ TEST_F(OverrideManagerTest, AcquiredIsIndependentOfWhatIsRequired) {
 
 TEST_F(OverrideManagerTest, RequiredOutlivesItsAcquirer) {
   manager_.setRequired({kJoystick});
-  EXPECT_TRUE(manager_.acquire(kJoystick));
-  manager_.release(kJoystick);
+  EXPECT_TRUE(manager_.acquire(OverrideHolder::kRequest, kJoystick));
+  manager_.release(OverrideHolder::kRequest, kJoystick);
   EXPECT_EQ(sim_.value(kJoystick), 1.0F);
   EXPECT_EQ(manager_.active(), Names{kJoystick});
 }
 
+TEST_F(OverrideManagerTest, WhatTwoHoldIsGivenBackByTheLast) {
+  using Holders = std::set<OverrideHolder>;
+  EXPECT_TRUE(manager_.acquire(OverrideHolder::kRequest, kJoystick));
+  manager_.acquire(OverrideHolder::kTraffic, Names{kJoystick});
+  manager_.setRequired({kJoystick});
+  EXPECT_EQ(manager_.holders(kJoystick),
+            (Holders{OverrideHolder::kControls, OverrideHolder::kTraffic, OverrideHolder::kRequest}));
+  manager_.setRequired({});
+  manager_.release(OverrideHolder::kTraffic, kJoystick);
+  manager_.release(OverrideHolder::kTraffic, kJoystick);  // holds it no more
+  EXPECT_EQ(manager_.holders(kJoystick), Holders{OverrideHolder::kRequest});
+  EXPECT_EQ(sim_.value(kJoystick), 1.0F);
+  EXPECT_FALSE(manager_.releasesPending());
+  manager_.release(OverrideHolder::kRequest, kJoystick);
+  EXPECT_TRUE(manager_.holders(kJoystick).empty());
+  EXPECT_EQ(sim_.value(kJoystick), 0.0F);
+}
+
 TEST_F(OverrideManagerTest, ReleasingWhatWasNotAcquiredDoesNothing) {
-  manager_.release(kJoystick);
+  manager_.release(OverrideHolder::kRequest, kJoystick);
   manager_.setRequired({kThrottles});
-  manager_.release(kThrottles);
+  manager_.release(OverrideHolder::kRequest, kThrottles);
   EXPECT_EQ(sim_.writes(), (Writes{{kThrottles, 1.0F}}));
 }
 
 TEST_F(OverrideManagerTest, EachIsGivenBackInItsOwnWay) {
   sim_.set(kThrottle12, -2.0F);
-  EXPECT_TRUE(manager_.acquire(kThrottle12, 0.5F));
-  EXPECT_TRUE(manager_.acquire(kFailure, 6.0F, false));
+  EXPECT_TRUE(manager_.acquire(OverrideHolder::kRequest, kThrottle12, 0.5F));
+  EXPECT_TRUE(manager_.acquire(OverrideHolder::kFailures, kFailure, 6.0F, false));
   EXPECT_EQ(sim_.value(kThrottle12), 0.5F);
-  manager_.release(kThrottle12);
-  manager_.release(kFailure);
+  manager_.release(OverrideHolder::kRequest, kThrottle12);
+  manager_.release(OverrideHolder::kFailures, kFailure);
   EXPECT_EQ(sim_.value(kThrottle12), -2.0F) << "X-Plane 11's own 'not overridden'";
   EXPECT_EQ(sim_.value(kFailure), 0.0F);
   manager_.confirmReleases(1.0);
@@ -181,8 +200,8 @@ TEST_F(OverrideManagerTest, EachIsGivenBackInItsOwnWay) {
 }
 
 TEST_F(OverrideManagerTest, AcquiredAnewItTakesTheNewValue) {
-  EXPECT_TRUE(manager_.acquire(kFailure, 6.0F));
-  EXPECT_TRUE(manager_.acquire(kFailure, 1.0F));
+  EXPECT_TRUE(manager_.acquire(OverrideHolder::kFailures, kFailure, 6.0F));
+  EXPECT_TRUE(manager_.acquire(OverrideHolder::kFailures, kFailure, 1.0F));
   EXPECT_EQ(sim_.value(kFailure), 1.0F);
   sim_.set(kFailure, 0.0F);
   manager_.refresh();

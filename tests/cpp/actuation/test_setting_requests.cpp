@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -120,7 +122,7 @@ TEST_F(SettingRequestsTest, AnOverrideIsHeldUntilItIsGivenBack) {
 TEST_F(SettingRequestsTest, AnOverrideThatIsFlownByIsNotGivenBack) {
   constexpr const char* kRoll = "sim/operation/override/override_joystick_roll";
   sim_.set(kRoll, 0.0F);
-  overrides_.acquire(kRoll);  // held by set_dataref as well
+  overrides_.acquire(OverrideHolder::kRequest, kRoll);  // held by set_dataref as well
   overrides_.setRequired({kRoll});
   sim_.clearMessages();
   const auto written = settings_.setDataref(kRoll, {0.0F}, kWho);
@@ -129,8 +131,46 @@ TEST_F(SettingRequestsTest, AnOverrideThatIsFlownByIsNotGivenBack) {
   EXPECT_TRUE(sim_.messages().empty());
   EXPECT_EQ(sim_.value(kRoll), 1.0F);
   overrides_.setRequired({});
-  EXPECT_EQ(settings_.setDataref(kRoll, {0.0F}, kWho).result.code, ResultCode::kOk);
-  EXPECT_EQ(sim_.value(kRoll), 0.0F);
+  EXPECT_EQ(sim_.value(kRoll), 0.0F) << "set_dataref has taken its own hold back";
+}
+
+TEST_F(SettingRequestsTest, AnOverrideThatSurfacesOrTrafficNeedIsNotGivenBack) {
+  constexpr const char* kPlanePath = "sim/operation/override/override_planepath[1]";
+  const std::vector<std::tuple<OverrideHolder, std::string, std::string>> held = {
+      {OverrideHolder::kSurfaces, core::kSurfaceOverride,
+       "drives the surfaces by: clear their failures, and end control/surfaces and excitations of surfaces"},
+      {OverrideHolder::kTraffic, kPlanePath, "places that aircraft by: leave it out of traffic/command"},
+  };
+  for (const auto& [holder, name, use] : held) {
+    sim_.set(name, 0.0F);
+    overrides_.acquire(OverrideHolder::kRequest, name);  // held by set_dataref as well
+    overrides_.acquire(holder, name);
+    sim_.clearMessages();
+    const auto written = settings_.setDataref(name, {0.0F}, kWho);
+    EXPECT_EQ(written.result.code, ResultCode::kRefused);
+    EXPECT_EQ(written.result.text, name + " is what tx_node " + use +
+                                       ", and it is given back; or run scripts/release_overrides, which ends all "
+                                       "flying");
+    EXPECT_TRUE(sim_.messages().empty());
+    EXPECT_EQ(overrides_.holders(name), std::set<OverrideHolder>{holder});
+    overrides_.release(holder, name);
+    EXPECT_EQ(sim_.value(name), 0.0F);
+  }
+}
+
+TEST_F(SettingRequestsTest, TheOverrideOfDrivenSurfacesIsNotSetToo) {
+  const std::string name = core::kSurfaceOverride;
+  sim_.set(name, 0.0F);
+  overrides_.acquire(OverrideHolder::kSurfaces, name);
+  const auto written = settings_.setDataref(name, {1.0F}, kWho);
+  EXPECT_EQ(written.result.code, ResultCode::kRefused);
+  EXPECT_EQ(written.result.text,
+            name +
+                " is what tx_node drives the surfaces by: clear their failures, and end control/surfaces and "
+                "excitations of surfaces, and set it then: until it is given back, tx_node has it set already");
+  overrides_.release(OverrideHolder::kSurfaces, name);
+  EXPECT_EQ(sim_.value(name), 0.0F) << "the surfaces are X-Plane's again";
+  EXPECT_EQ(settings_.setDataref(name, {1.0F}, kWho).result.code, ResultCode::kOk);
 }
 
 TEST_F(SettingRequestsTest, ACommandWithoutANameIsRefusedWithWhatIsExpected) {

@@ -147,6 +147,17 @@ TEST_F(TrafficControlTest, GivesBackWhatAListDoesNotHaveAnyMore) {
                                                 "traffic: 3 given back"}));
 }
 
+TEST_F(TrafficControlTest, LeavesSetWhatSetDatarefHolds) {
+  overrides_.acquire(OverrideHolder::kRequest, kOverride3);
+  TrafficControl& traffic = control();
+  EXPECT_EQ(traffic.command({poseOf(3)}, now()), "");
+  fly(0.1);
+  EXPECT_EQ(sim_.value(kPlane3 + "v_z"), -60.0F);
+  EXPECT_EQ(traffic.command({}, now()), "");
+  EXPECT_EQ(sim_.value(kOverride3), 1.0F);
+  EXPECT_EQ(inJournal(), 1U) << "it is given back at the end";
+}
+
 TEST_F(TrafficControlTest, GivesAllBackWhenItsSourceIsSilent) {
   TrafficControl& traffic = control();
   EXPECT_EQ(traffic.command({poseOf(3)}, now()), "");

@@ -127,6 +127,55 @@ def test_a_failure_that_another_client_repaired_fails_again_at_the_press_after_t
 
 
 @pytest.mark.parametrize(
+    ("code", "repair", "then"),
+    [
+        ("OK", "OK", ["clear"]),
+        ("OK", "REFUSED", ["clear"]),
+        ("ACCEPTED", "OK", ["clear"]),
+        ("TIMEOUT", "OK", ["clear"]),
+        ("TIMEOUT", "REFUSED", ["clear", "set"]),  # tx_node has given it up
+        ("REFUSED", "OK", ["set"]),
+        ("NO_LINK", "OK", ["set"]),
+    ],
+)
+def test_the_next_press_repairs_all_that_may_be_broken(world, code, repair, then):
+    import rospy
+    from xplane_bridge.msg import ServiceResult
+    from xplane_bridge.srv import ClearFailures, ClearFailuresResponse, SetFailure, SetFailureResponse
+
+    asked = []
+
+    def set_failure(_request):
+        asked.append("set")
+        return SetFailureResponse(code == "OK", ServiceResult(getattr(ServiceResult, code), f"it is {code}"))
+
+    def clear_failures(request):
+        asked.append("clear")
+        answer = ServiceResult(getattr(ServiceResult, repair), f"the repair is {repair}")
+        return ClearFailuresResponse(repair == "OK", answer, list(request.names))
+
+    services = [
+        rospy.Service(f"{world.namespace}/tx_node/set_failure", SetFailure, set_failure),
+        rospy.Service(f"{world.namespace}/tx_node/clear_failures", ClearFailures, clear_failures),
+    ]
+    world.mapper = world.start("joystick_mapper_node", STICK)
+    joy = RepeatedJoy(world, 4, 7)
+    joy.plug_in()
+    try:
+        for calls in (["set"], ["set", *then]):
+            hear(world)
+            joy.buttons[4] = 1
+            wait_until(lambda expected=calls: len(asked) >= len(expected), WAIT_S, f"the calls {calls}")
+            release(joy, world)
+    finally:
+        joy.pull_out()
+        for service in services:
+            service.shutdown()
+    assert asked == ["set", *then]
+    reported(world, "functions.engine: done" if code == "OK" else f"functions.engine: it is {code}")
+
+
+@pytest.mark.parametrize(
     ("section", "words"),
     [
         (

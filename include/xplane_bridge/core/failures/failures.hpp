@@ -107,8 +107,8 @@ class FailureRegistry {
   std::vector<FailureLabel> labels() const;
   /// Active failures that SurfaceDriver flies; planned with datarefs ones only after useDriver().
   std::vector<SurfaceFailure> drivenSurfaces() const;
-  /// X-Plane did not obey the datarefs: SurfaceDriver takes this one, from `sim_time` [s] on. `stuck_deg`: where a
-  /// surface got stuck meanwhile.
+  /// X-Plane did not obey the datarefs, which the failure gives up: SurfaceDriver takes this one, from `sim_time` [s]
+  /// on. `stuck_deg`: where a surface got stuck meanwhile.
   void useDriver(const std::string& name, double sim_time, std::optional<double> stuck_deg = std::nullopt);
 
  private:
@@ -116,9 +116,11 @@ class FailureRegistry {
     FailurePlan plan;
     FailureTrigger trigger = FailureTrigger::kNow;
     double trigger_value = 0.0;
-    bool active = false, confirmed = false, driven = false;
+    bool active = false, confirmed = false;
     double since = std::numeric_limits<double>::quiet_NaN();
     std::set<std::string> shown;  // of the datarefs, those X-Plane shows failed
+
+    bool driven() const { return plan.datarefs.empty(); }
   };
   std::map<std::string, Entry> entries_;   // of the bridge
   std::map<std::string, double> of_menu_;  // [s] simulator time since when

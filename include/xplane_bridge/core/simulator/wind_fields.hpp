@@ -14,7 +14,7 @@ inline constexpr double kWindHeight = 6.096;
 double oneMinusCosine(double at, double length);
 
 /// Wind [m/s] at a height above ground that rises with its logarithm, as over open country (MIL-F-8785C, 3.7.3.1).
-/// Below 3 ft as there, above 1000 ft as there.
+/// Below 3 ft as there, above 1000 ft as there; 0 below the roughness where that is higher than 3 ft.
 /// @param speed [m/s] at kWindHeight
 /// @param roughness [m] length of the ground's roughness; 0.15 ft for approach and landing, 2 ft for other phases
 double logarithmicShear(double speed, double roughness, double height);

@@ -10,9 +10,9 @@
 
 namespace xplane_bridge::core {
 
-// Of the faults (SurfaceFault; values of SetFailure): "up" is towards the low end of a surface's travel (trailing edge
-// up, rudder trailing edge left). Centred is where it is with controls centred; floating trails with the airflow, a
-// surrogate (DriverOptions::floating_gain); gone cannot be expressed by a deflection.
+// Of the faults (SurfaceFault; values of SetFailure): "up" is trailing edge up, rudder trailing edge left. Centred is
+// where it is with controls centred; floating trails with the airflow, a surrogate (DriverOptions::floating_gain); gone
+// cannot be expressed by a deflection.
 
 struct SurfaceFailure {
   std::size_t surface = 0;  ///< number in surfaceTable()

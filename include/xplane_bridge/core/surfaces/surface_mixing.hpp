@@ -69,6 +69,9 @@ struct SurfaceLaw {
 
   double deflection(const MixingVector& terms) const { return slopes.dot(terms); }
   double neutral() const { return slopes[0]; }
+  /// [deg] Ends of the travel: trailing edge up (rudder: left), and down.
+  double fullyUp() const { return upSign(surface) > 0.0 ? high_deg : low_deg; }
+  double fullyDown() const { return upSign(surface) > 0.0 ? low_deg : high_deg; }
 };
 
 /// The mixing of one aircraft.

@@ -2,8 +2,8 @@
 
 /// Every control surface X-Plane can show and take one by one: names, datarefs, and commands to single surfaces.
 ///
-/// Deflections in degrees with X-Plane's sign: trailing edge down +, rudder trailing edge right +.
-/// docs/control/surfaces.md.
+/// Deflections in degrees with X-Plane's sign: trailing edge down +, rudder trailing edge right +, spoilers and speed
+/// brakes trailing edge up +, yaw brakes open +. docs/control/surfaces.md.
 
 #include <cstddef>
 #include <cstdint>
@@ -39,6 +39,9 @@ const std::vector<SurfaceInfo>& surfaceTable();
 
 /// Number of a surface by name.
 std::optional<std::size_t> surfaceNumber(const std::string& name);
+
+/// Sign of a deflection with the trailing edge up (rudder: left; yaw brake: open).
+double upSign(std::size_t surface);
 
 constexpr double kMaxDeflectionDeg = 90.0;
 

@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -53,6 +53,7 @@ class JoyFunctions {
   std::string runCommand(const JoyFunction& function);
   std::string setView(const JoyFunction& function);
   std::string toggleFailure(const JoyFunction& function);
+  std::string setFailure(const JoyFunction& function);
   template <class Service>
   std::string call(const std::string& service, Service* message);
 
@@ -60,7 +61,8 @@ class JoyFunctions {
   const std::vector<JoyFunction> functions_;
   Report report_;
   std::atomic<bool> paused_{false};
-  std::set<std::string> broken_;      // by a press, of the thread
+  /// By a press, as far as is known, with ServiceResult's code of the answer; of the thread.
+  std::map<std::string, std::uint8_t> broken_;
   LatestWorker<std::size_t> worker_;  // last: it uses all of the above
 };
 

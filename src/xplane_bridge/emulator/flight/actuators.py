@@ -15,8 +15,8 @@ from xplane_bridge.emulator.flight.flight_model import (
     SurfaceSpec,
 )
 
-#: A free surface trails: its angle per angle of attack (elevator, aileron: trailing edge goes up as alpha grows).
-FLOAT_PER_ALPHA = -0.5
+#: A free surface of wing or tailplane trails: its trailing edge goes up by this per angle of attack.
+FLOAT_PER_ALPHA = 0.5
 #: How fast a free surface finds its trailing angle [deg/s].
 FLOAT_RATE_DEG_S = 90.0
 
@@ -61,11 +61,11 @@ class SurfaceActuator:
         elif kind is SurfaceFaultKind.CENTRED:
             self._approach(0.0, spec.rate_deg_s * dt)
         elif kind is SurfaceFaultKind.HARD_OVER_UP:
-            self._approach(spec.minimum_deg, spec.rate_deg_s * dt)
+            self._approach(spec.fully_up_deg, spec.rate_deg_s * dt)
         elif kind is SurfaceFaultKind.HARD_OVER_DOWN:
-            self._approach(spec.maximum_deg, spec.rate_deg_s * dt)
+            self._approach(spec.fully_down_deg, spec.rate_deg_s * dt)
         elif kind is SurfaceFaultKind.FLOATING:
-            trailing = 0.0 if spec.kind is SurfaceKind.RUDDER else FLOAT_PER_ALPHA * alpha_deg
+            trailing = 0.0 if spec.kind is SurfaceKind.RUDDER else FLOAT_PER_ALPHA * spec.up_sign * alpha_deg
             self._approach(min(max(trailing, spec.minimum_deg), spec.maximum_deg), FLOAT_RATE_DEG_S * dt)
         elif kind is SurfaceFaultKind.GONE:
             self.position_deg = 0.0
@@ -137,6 +137,8 @@ def asymmetric(command: float, up_deg: float, down_deg: float) -> float:
     return command * (down_deg if command > 0.0 else up_deg)
 
 
-def sided(name: str, kind: SurfaceKind, side: Side, up_deg: float, down_deg: float, rate_deg_s: float) -> SurfaceSpec:
-    """A specification from stops given as positive angles."""
-    return SurfaceSpec(name, kind, side, -up_deg, down_deg, rate_deg_s)
+def sided(
+    name: str, kind: SurfaceKind, side: Side, negative_deg: float, positive_deg: float, rate_deg_s: float
+) -> SurfaceSpec:
+    """A specification from the stops of negative and of positive deflections, both given as positive angles."""
+    return SurfaceSpec(name, kind, side, -negative_deg, positive_deg, rate_deg_s)

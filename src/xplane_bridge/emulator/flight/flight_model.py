@@ -60,9 +60,24 @@ class SurfaceSpec:
     name: str  #: X-Plane dataref leaf without ``def``
     kind: SurfaceKind
     side: Side
-    minimum_deg: float  #: trailing edge up (rudder: left)
-    maximum_deg: float  #: trailing edge down (rudder: right)
+    minimum_deg: float
+    maximum_deg: float
     rate_deg_s: float
+
+    @property
+    def up_sign(self) -> float:
+        """Sign of a deflection with the trailing edge up (rudder: left)."""
+        return 1.0 if self.kind is SurfaceKind.SPEED_BRAKE else -1.0
+
+    @property
+    def fully_up_deg(self) -> float:
+        """The end of the travel with the trailing edge up (rudder: left)."""
+        return self.maximum_deg if self.up_sign > 0.0 else self.minimum_deg
+
+    @property
+    def fully_down_deg(self) -> float:
+        """The other end."""
+        return self.minimum_deg if self.up_sign > 0.0 else self.maximum_deg
 
 
 class SurfaceFaultKind(enum.Enum):

@@ -54,7 +54,7 @@ class FailureManagerTest : public DrivenSurfacesTest {
       for (auto& [time, event] : events_) {
         if (event && sim_.time() >= time) std::exchange(event, nullptr)();
       }
-      if (sim_.status().state == LinkState::kConnected) failures_.onFrame(watch_);
+      if (core::answers(sim_.status().state)) failures_.onFrame(watch_, placing_);
       eachFrame();
       failures_.tick();
     };
@@ -66,6 +66,15 @@ class FailureManagerTest : public DrivenSurfacesTest {
   void setLink(LinkState state) {
     DrivenSurfacesTest::setLink(state);
     failures_.onLink(sim_.status());
+  }
+  /// Another aircraft, whose mixing has one law more.
+  void adopt(core::MixingModel mixing, const core::SurfaceLaw& more) {
+    mixing.laws.push_back(more);
+    std::sort(mixing.laws.begin(), mixing.laws.end(),
+              [](const auto& a, const auto& b) { return a.surface < b.surface; });
+    writeMixingFile(folder(), mixing);
+    surfaces_.onAircraft(mixing.aircraft);
+    surfaces_.takeAbandoned();
   }
   /// What happens while a call under test waits.
   void after(double seconds, const std::function<void()>& event) { events_.emplace_back(sim_.time() + seconds, event); }
@@ -114,6 +123,7 @@ class FailureManagerTest : public DrivenSurfacesTest {
   }
 
   core::FlightWatch watch_;
+  bool placing_ = false;                                          // the aircraft is on its way to another flight
   std::vector<std::pair<double, std::function<void()>>> events_;  // [s] of the fake clock
   std::vector<FailureSnapshot> published_;
   std::vector<std::tuple<std::string, std::string, bool>> reported_;  // text, who, success

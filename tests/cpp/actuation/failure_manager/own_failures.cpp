@@ -168,11 +168,7 @@ TEST_F(FailureManagerTest12, SurfacesThatXPlaneBreaksTogetherAreNamed) {
   core::MixingModel mixing = FakeAirframe::mixing("WIDE");
   core::SurfaceLaw outer = mixing.laws.front();
   outer.surface = core::surfaceNumber("aileron1_wing3_left").value();
-  mixing.laws.push_back(outer);
-  std::sort(mixing.laws.begin(), mixing.laws.end(), [](const auto& a, const auto& b) { return a.surface < b.surface; });
-  writeMixingFile(folder(), mixing);
-  surfaces_.onAircraft("WIDE");
-  surfaces_.takeAbandoned();
+  adopt(mixing, outer);
   const RequestResult left = set(broken(FakeAirframe::kLeft, "stuck"));
   EXPECT_EQ(left.code, ResultCode::kOk);
   EXPECT_EQ(left.text, "X-Plane shows it; X-Plane breaks with it aileron1_wing3_left");
@@ -188,6 +184,41 @@ TEST_F(FailureManagerTest12, HardOverOfXPlanesMustReachTheEndOfTheTravel) {
   };
   require(broken(FakeAirframe::kLeft, "hard_over_up"));
   EXPECT_EQ(state(), SurfaceControlState::kIdle) << "within 2 deg";
+}
+
+TEST_F(FailureManagerTest12, ASpoilerOfXPlanesThatIsHardOverUpIsOpen) {
+  core::MixingModel mixing = FakeAirframe::mixing("BRAKED");
+  core::SurfaceLaw spoiler;
+  spoiler.surface = core::surfaceNumber("spoiler1_wing1_left").value();
+  spoiler.slopes[static_cast<Eigen::Index>(core::MixingTerm::kSpeedbrake)] = 60.0;
+  spoiler.high_deg = 60.0;
+  adopt(mixing, spoiler);
+  sim_.on_message = [this](const core::FakeSimulator::Message& message) {
+    if (message.path.find("rspo_1_lft_mxup") != std::string::npos && message.value == 6.0F) {
+      airframe_.hold("spoiler1_wing1_left", 60.0);
+    }
+  };
+  require(broken("spoiler1_wing1_left", "hard_over_up"));
+  EXPECT_EQ(state(), SurfaceControlState::kIdle);
+}
+
+TEST_F(FailureManagerTest12, WhereXPlanesDoesNotActAnotherSurfaceOfItsSetBreaksAsWellAndTheMenuIsLeftAlone) {
+  const std::string up = "sim/operation/failures/rel_fcon_ailn_1_lft_mxup";
+  core::MixingModel mixing = FakeAirframe::mixing("WIDE");
+  core::SurfaceLaw outer = mixing.laws.front();
+  outer.surface = core::surfaceNumber("aileron1_wing3_left").value();
+  adopt(mixing, outer);
+  sim_.run(1.2);
+  EXPECT_EQ(set(broken(FakeAirframe::kLeft, "hard_over_up")).code, ResultCode::kOk);
+  EXPECT_EQ(set(broken("aileron1_wing3_left", "hard_over_up")).code, ResultCode::kOk);
+  EXPECT_EQ(state(), SurfaceControlState::kDriving);
+  sim_.run(1.0);
+  sim_.set(up, 6.0F);
+  sim_.run(1.1);
+  EXPECT_FALSE(label("rel_fcon_ailn_1_lft_mxup").by_bridge);
+  requireClear();
+  EXPECT_EQ(sim_.value(up), 6.0F);
+  EXPECT_EQ(labelNames(), Names{"rel_fcon_ailn_1_lft_mxup"});
 }
 
 struct OwnCase {

@@ -43,6 +43,51 @@ TEST_F(FailureManagerTest, ArmedFailureComesTrueAtItsTrigger) {
   }
 }
 
+/// Engine 1 fails below 300 m and engine 2 below 50 m/s: the aircraft flies above both, and then stands on the ground.
+class NotFlown : public FailureManagerTest {
+ protected:
+  NotFlown() { show(1000.0, 70.0); }
+  void show(double height, double airspeed) {
+    watch_.height_agl = height;
+    watch_.indicated_airspeed = airspeed;
+    sim_.run(0.1);
+  }
+  void arm() {
+    for (const core::FailureRequest& request : {triggered("engine_1", FailureTrigger::kAtAltitudeBelow, 300.0),
+                                                triggered("engine_2", FailureTrigger::kAtSpeedBelow, 50.0)}) {
+      ASSERT_EQ(set(request).code, ResultCode::kAccepted);
+    }
+  }
+  void expectNoneThenBothAfter(const std::function<void()>& end) {
+    show(2.0, 0.0);
+    EXPECT_FALSE(label("engine_1").active);
+    EXPECT_FALSE(label("engine_2").active);
+    end();
+    sim_.run(0.1);
+    EXPECT_TRUE(label("engine_1").active);
+    EXPECT_TRUE(label("engine_2").active);
+  }
+};
+
+TEST_F(NotFlown, HeightsAndSpeedsOnTheWayToAnotherFlightTriggerNothing) {
+  arm();
+  placing_ = true;
+  expectNoneThenBothAfter([this] { placing_ = false; });
+}
+
+TEST_F(NotFlown, ThoseOfAReplayTriggerNothing) {
+  arm();
+  watch_.replay = true;
+  expectNoneThenBothAfter([this] { watch_.replay = false; });
+}
+
+TEST_F(NotFlown, ThoseOfAPauseTriggerNothingAlsoWhereItWasArmedInIt) {
+  setLink(LinkState::kPaused);
+  show(2.0, 0.0);
+  arm();
+  expectNoneThenBothAfter([this] { setLink(LinkState::kConnected); });
+}
+
 TEST_F(FailureManagerTest, TimeTriggerCountsFromTheRequest) {
   ASSERT_EQ(set(triggered("engine_1", FailureTrigger::kAtSimTime, 5.0)).code, ResultCode::kAccepted);
   sim_.run(4.9);

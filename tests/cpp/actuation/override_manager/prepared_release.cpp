@@ -134,7 +134,7 @@ TEST_F(PreparedRelease, IsOverWithTheFlightAlsoInTheJournal) {
 
 TEST_F(OverrideManagerTest, GivenBackByAnotherProcessNothingIsSetAnyMore) {
   manager_.setRequired({kJoystick});
-  manager_.acquire(kFailure, 6.0F, false);
+  manager_.acquire(OverrideHolder::kFailures, kFailure, 6.0F, false);
   manager_.giveBackAll();
   EXPECT_TRUE(manager_.active().empty());
   EXPECT_EQ(sim_.value(kFailure), 0.0F);

@@ -17,8 +17,8 @@ TEST_F(OverrideManagerTest, LostDatagramIsMadeGoodByTheRefresh) {
 
 TEST_F(OverrideManagerTest, RefreshRepeatsWhatIsSetButForFailures) {
   manager_.setRequired({kJoystick});
-  manager_.acquire(core::kSurfaceOverride);
-  manager_.acquire(kFailure, 6.0F, false);
+  manager_.acquire(OverrideHolder::kSurfaces, core::kSurfaceOverride);
+  manager_.acquire(OverrideHolder::kFailures, kFailure, 6.0F, false);
   EXPECT_EQ(manager_.active(), (Names{core::kSurfaceOverride, kJoystick}));
   EXPECT_EQ(sim_.subscribed(), std::multiset<std::string>{kJoystick}) << "the other two are watched by their holders";
   sim_.clearMessages();

@@ -7,7 +7,7 @@ namespace {
 
 TEST_F(OverrideManagerTest, ReleaseAllGivesBackEverythingForGood) {
   manager_.setRequired({kJoystick, kThrottles});
-  manager_.acquire(kFailure, 6.0F, false);
+  manager_.acquire(OverrideHolder::kFailures, kFailure, 6.0F, false);
   manager_.setRequired({kJoystick});  // the throttles' release is pending
   reports_.clear();
   EXPECT_TRUE(manager_.releaseAll(1.0));
@@ -19,7 +19,7 @@ TEST_F(OverrideManagerTest, ReleaseAllGivesBackEverythingForGood) {
   EXPECT_EQ(reports_, (Reports{{"released rel_elv_L_jam, override_joystick, override_throttles", true}}));
   sim_.clearMessages();
   manager_.setRequired({kJoystick});
-  EXPECT_FALSE(manager_.acquire(kThrottles));
+  EXPECT_FALSE(manager_.acquire(OverrideHolder::kRequest, kThrottles));
   manager_.refresh();
   EXPECT_TRUE(sim_.messages().empty());
 }
@@ -39,7 +39,7 @@ TEST_F(OverrideManagerTest, ReleaseAllSaysWhatCouldNotBeSeen) {
 }
 
 TEST_F(OverrideManagerTest, WhatReleaseAllHasSeenLeavesTheJournalWhateverElseHasNot) {
-  manager_.acquire(kUnknown, 1.0F);
+  manager_.acquire(OverrideHolder::kRequest, kUnknown, 1.0F);
   manager_.setRequired({kJoystick, "DATA row 8"});
   reports_.clear();
   EXPECT_FALSE(manager_.releaseAll(0.5));
@@ -168,6 +168,50 @@ TEST_F(OverrideManagerTest, LeftoverTakenOverMeanwhileStaysInTheJournal) {
   ASSERT_EQ(inJournal(), Names{kJoystick});
   EXPECT_EQ(sim_.journal()->own().size(), 1U);
   EXPECT_EQ(manager_.active(), Names{kJoystick});
+}
+
+TEST_F(OverrideManagerTest, LeftoverThatThisRunHasSetMeanwhileStaysSet) {
+  sim_.setAll({kJoystick, kThrottle12}, 1.0F);
+  sim_.journalOfAnother().record("override:" + std::string(kJoystick), kOverridePurpose,
+                                 {core::UndoDref{kThrottle12, 0.3F, false}, core::UndoDref{kJoystick, 0.0F}});
+  // While X-Plane is asked whether it is released already: it has a lever to be written first.
+  sim_.on_frame = [this] { manager_.setRequired({kJoystick}); };
+  EXPECT_TRUE(manager_.releaseLeftovers(1.0));
+  EXPECT_EQ(sim_.writes(), (Writes{{kJoystick, 1.0F}}));
+  EXPECT_EQ(sim_.journal()->own().size(), 1U);
+  EXPECT_EQ(reports_, (Reports{{"set override_joystick", true}}));
+}
+
+TEST_F(OverrideManagerTest, LeftoverThatAnotherPartOfThisRunHasTakenOverIsNotUndone) {
+  const std::vector<core::UndoOperation> undo = {core::UndoDref{kThrottle12, 0.3F, false},
+                                                 core::UndoDref{kJoystick, 0.0F}};
+  sim_.setAll({kJoystick, kThrottle12}, 1.0F);
+  sim_.journalOfAnother().record("wind", kOverridePurpose, undo);
+  // While X-Plane is asked whether it is undone already.
+  sim_.on_frame = [this, &undo] { sim_.journal()->record("wind", kOverridePurpose, undo); };
+  EXPECT_TRUE(manager_.releaseLeftovers(1.0));
+  EXPECT_TRUE(sim_.messages().empty());
+  EXPECT_EQ(sim_.journal()->own().size(), 1U);
+  EXPECT_TRUE(reports_.empty());
+}
+
+TEST_F(OverrideManagerTest, LeftoverThatAnotherPartOfThisRunTakesOverAfterItsReleaseIsNoneAnyMore) {
+  const std::vector<core::UndoOperation> undo = {core::UndoDref{kJoystick, 0.0F}};
+  sim_.set(kJoystick, 1.0F);
+  sim_.setReadOnly(kJoystick);  // so that its release is waited for
+  sim_.journalOfAnother().record("wind", kOverridePurpose, undo);
+  sim_.on_frame = [this, &undo] { sim_.journal()->record("wind", kOverridePurpose, undo); };
+  EXPECT_TRUE(manager_.releaseLeftovers(0.5));
+  EXPECT_EQ(sim_.journal()->own().size(), 1U);
+  EXPECT_TRUE(reports_.empty());
+}
+
+TEST_F(OverrideManagerTest, LeftoverThatThisRunSetsAfterItsReleaseIsNoneAnyMore) {
+  crashedRunHas(kJoystick);
+  sim_.on_frame = [this] { manager_.setRequired({kJoystick}); };
+  EXPECT_TRUE(manager_.releaseLeftovers(0.5)) << "X-Plane does not show it released";
+  EXPECT_EQ(sim_.writes(), (Writes{{kJoystick, 0.0F}, {kJoystick, 1.0F}}));
+  EXPECT_EQ(reports_, (Reports{{"set override_joystick", true}}));
 }
 
 TEST_F(OverrideManagerTest, LeftoversNeedAnXPlane) {

@@ -38,14 +38,29 @@ TEST_F(OverrideManagerTest, ReleaseThatDoesNotLastIsNone) {
 }
 
 TEST_F(OverrideManagerTest, WhatWasAcquiredIsLetGoButStopsNothing) {
-  manager_.acquire(kFailure, 6.0F);
-  manager_.acquire(core::kSurfaceOverride);
+  manager_.acquire(OverrideHolder::kFailures, kFailure, 6.0F);
+  manager_.acquire(OverrideHolder::kSurfaces, core::kSurfaceOverride);
   sim_.run(0.2);
   sim_.setAll({kFailure, core::kSurfaceOverride}, 0.0F);
   letSixAnswersPass();
   EXPECT_TRUE(manager_.releasedByOthers().empty());
   EXPECT_EQ(manager_.active(), Names{core::kSurfaceOverride}) << "its holder watches that one";
   EXPECT_EQ(reports_, (Reports{{"rel_elv_L_jam was released by another client", true}}));
+}
+
+TEST_F(OverrideManagerTest, SurfaceOverrideThatSetDatarefHoldsToo) {
+  manager_.acquire(OverrideHolder::kRequest, core::kSurfaceOverride);
+  manager_.acquire(OverrideHolder::kSurfaces, core::kSurfaceOverride);
+  sim_.run(0.2);
+  sim_.set(core::kSurfaceOverride, 0.0F);
+  sim_.run(0.12);
+  manager_.release(OverrideHolder::kSurfaces, core::kSurfaceOverride);  // as in the frame that shows it
+  manager_.refresh();
+  EXPECT_EQ(sim_.value(core::kSurfaceOverride), 0.0F) << "not taken back";
+  letSixAnswersPass();
+  EXPECT_TRUE(manager_.releasedByOthers().empty());
+  EXPECT_TRUE(manager_.active().empty());
+  EXPECT_EQ(reports_, (Reports{{"override_control_surfaces was released by another client", true}}));
 }
 
 TEST_F(OverrideManagerTest, ReleaseByOthersStopsAlsoWhereTheJournalFails) {
@@ -115,9 +130,9 @@ TEST_F(OverrideManagerTest, ReleaseThatXPlaneDoesNotShowStaysPending) {
 }
 
 TEST_F(OverrideManagerTest, ReleaseThatCannotBeShownHoldsUpNoOther) {
-  manager_.acquire(kUnknown, 1.0F);
+  manager_.acquire(OverrideHolder::kRequest, kUnknown, 1.0F);
   manager_.setRequired({kJoystick, kThrottles});
-  manager_.release(kUnknown);
+  manager_.release(OverrideHolder::kRequest, kUnknown);
   manager_.setRequired({kThrottles});
   manager_.confirmReleases(1.0);
   EXPECT_EQ(inJournal(), (Names{kUnknown, kThrottles}));

@@ -81,16 +81,11 @@ TEST_F(SurfaceIdentificationTest, EndsWithACrash) {
   expectGivenUp("the aircraft has crashed");
 }
 
-TEST_F(SurfaceIdentificationTest, EndsWithAFailure) {
+TEST_F(SurfaceIdentificationTest, EndsWithAFailureOfTheControls) {
   beginSignal();
-  core::FailureRequest request;
-  request.name = "engine_1";
-  request.kind = "failed";
-  request.trigger = 1;
-  request.trigger_value = 1000.0;
-  actuation_->failures().set(request, "test");
+  breakAtOnce("rel_conlock");
   run(0.1);
-  expectGivenUp("a failure is set: clear_failures first");
+  expectGivenUp("rel_conlock is broken: clear_failures repairs it");
 }
 
 TEST_F(SurfaceIdentificationTest, EndsWithTheMode) {

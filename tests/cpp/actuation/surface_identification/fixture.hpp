@@ -128,6 +128,12 @@ class SurfaceIdentificationTest : public testing::Test {
     request.kind = "centred";
     return actuation_->failures().set(request, "test").text;
   }
+  /// X-Plane's frames go on while the failure is waited for.
+  void breakAtOnce(const std::string& name, const std::string& kind = "failed") {
+    each_frame_ = [this] { actuation_->tick(); };
+    EXPECT_TRUE(actuation_->failures().set({name, kind, {}, 0, 0.0}, "test").success());
+    each_frame_ = nullptr;
+  }
 
   core::FakeSimulator sim_;
   FakeAirframe airframe_{&sim_};

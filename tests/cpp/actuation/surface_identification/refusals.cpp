@@ -39,14 +39,25 @@ TEST_F(SurfaceIdentificationTest, RefusesLimitsThatAreNone) {
   EXPECT_EQ(refusal(request), "min_height is nan: expected 0 (the default) or more");
 }
 
-TEST_F(SurfaceIdentificationTest, RefusesWhileAFailureIsSetOrWaits) {
-  core::FailureRequest request;
-  request.name = "engine_1";
-  request.kind = "failed";
-  request.trigger = 1;
-  request.trigger_value = 1000.0;
-  ASSERT_EQ(actuation_->failures().set(request, "test").code, ResultCode::kAccepted);
-  EXPECT_EQ(refusal(), "a failure is set: clear_failures first");
+TEST_F(SurfaceIdentificationTest, RefusesWhileTheControlsAreBrokenAndSaysWhatRepairsThem) {
+  const std::string lock = "sim/operation/failures/rel_conlock";
+  sim_.set(lock, 6.0F);
+  run(1.1);
+  EXPECT_EQ(refusal(), "rel_conlock is failed in the simulator: clear_failures with include_simulator repairs it");
+  sim_.set(lock, 0.0F);
+  run(1.1);
+  breakAtOnce("rel_conlock");
+  EXPECT_EQ(refusal(), "rel_conlock is broken: clear_failures repairs it");
+}
+
+TEST_F(SurfaceIdentificationTest, IsNotKeptByAFailureOfOtherThingsOrByOneThatWaits) {
+  sim_.set("sim/operation/failures/rel_pitot", 6.0F);
+  core::FailureRequest armed{"rel_conlock", "failed", {}, 1, 1000.0};
+  ASSERT_EQ(actuation_->failures().set(armed, "test").code, ResultCode::kAccepted);
+  run(1.1);
+  begin();
+  run(15.0);
+  EXPECT_TRUE(outcome().success) << outcome().text;
 }
 
 TEST_F(SurfaceIdentificationTest, RefusesAStickFarOffTheMiddle) {
@@ -69,6 +80,10 @@ TEST_F(SurfaceIdentificationTest, RefusesWhileSurfacesAreDriven) {
   ASSERT_EQ(actuation_->commandSurfaces({FakeAirframe::kLeft}, {2.0F}, 1), "");
   run(0.1);
   EXPECT_EQ(refusal(), "the surfaces are driven one by one: end that first");
+  ASSERT_EQ(actuation_->commandSurfaces({}, {}, 2), "");
+  run(3.0);
+  breakAtOnce(FakeAirframe::kLeft, "centred");
+  EXPECT_EQ(refusal(), "aileron1_wing2_left is broken: clear_failures repairs it");
 }
 
 TEST_F(SurfaceIdentificationTest, RefusesWhileAnotherProgramHasTheSurfaces) {

@@ -283,6 +283,24 @@ TEST(FailureRegistry, DriverFliesWhatXPlaneCannotOrDoesNot) {
   EXPECT_DOUBLE_EQ(registry.labels()[1].since_sim_time, 3.0);
 }
 
+TEST(FailureRegistry, XPlanesFailureThatDidNotActIsFreeForOthers) {
+  const std::string up = "sim/operation/failures/rel_fcon_rudd_1_ctr_mxup";
+  FailureRegistry registry;
+  const auto first = request("rudder1_fin1", "hard_over_up");
+  const auto second = planFailure(request("rudder1_fin2", "hard_over_up"), k12).plan;
+  registry.add(first, planFailure(first, k12).plan, at(1.0));
+  registry.due(at(1.0));
+  EXPECT_EQ(registry.sameAs(second), "rudder1_fin1");
+  registry.useDriver("rudder1_fin1", 3.0);
+  EXPECT_EQ(registry.sameAs(second), std::nullopt);
+  EXPECT_TRUE(registry.observe(up, 6, 4.0)) << "set in the menu";
+  EXPECT_TRUE(registry.isOfMenu("rel_fcon_rudd_1_ctr_mxup"));
+  const auto cleared = registry.clear({}, false);
+  EXPECT_EQ(cleared.names, std::vector<std::string>{"rudder1_fin1"});
+  ASSERT_EQ(cleared.undo.size(), 1u);
+  EXPECT_TRUE(cleared.undo[0].datarefs.empty()) << "the menu's stays set";
+}
+
 TEST(FailureRegistry, SecondRequestOfANameReplacesTheFirst) {
   FailureRegistry registry;
   auto r = request("aileron1_wing2_left", "stuck", 5.0);

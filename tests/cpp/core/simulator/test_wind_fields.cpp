@@ -24,6 +24,16 @@ TEST(LogarithmicShear, RisesWithTheLogarithmOfHeight) {
   EXPECT_NEAR(logarithmicShear(10.0, roughness, 5000.0), 26.98970, 1e-5) << "as at 1000 ft";
 }
 
+TEST(LogarithmicShear, FadesToNothingAtTheRoughnessAndDoesNotTurnBelow) {
+  for (const double roughness : {0.95, 1.5, 2.0}) {
+    for (const double height : {0.0, 0.9144, roughness}) {
+      EXPECT_EQ(logarithmicShear(10.0, roughness, height), 0.0) << roughness << " m, at " << height << " m";
+    }
+    EXPECT_GT(logarithmicShear(10.0, roughness, roughness + 0.1), 0.0) << roughness << " m";
+    EXPECT_NEAR(logarithmicShear(10.0, roughness, 6.096), 10.0, 1e-9) << roughness << " m";
+  }
+}
+
 TEST(LinearShear, RisesByItsGradient) {
   EXPECT_NEAR(linearShear(8.0, 0.05, 26.096), 9.0, 1e-12);
   EXPECT_NEAR(linearShear(0.0, -0.1, 106.096), -10.0, 1e-12);

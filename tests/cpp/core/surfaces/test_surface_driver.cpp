@@ -134,6 +134,29 @@ TEST(SurfaceDriver, EveryFaultDoesWhatItsNameSays) {
   EXPECT_NEAR(sent(slow.step(stick(1.0), {}, 0.5), kRight), -20.0, 1e-9) << "a healthy one is fast";
 }
 
+TEST(SurfaceDriver, ASpoilerAndASpeedBrakeAreUpWhereTheyAreOpen) {
+  for (const char* name : {"spoiler1_wing1_left", "speedbrake1_wing1_left"}) {
+    SCOPED_TRACE(name);
+    const auto settled = [name](SurfaceFault fault) {
+      MixingModel m;
+      SurfaceLaw law;
+      law.surface = numberOf(name);
+      law.slopes[static_cast<Eigen::Index>(MixingTerm::kSpeedbrake)] = 60.0;
+      law.high_deg = 60.0;
+      m.laws.push_back(law);
+      SurfaceDriver driver(m);
+      driver.engage(shown({{law.surface, 30.0}}));
+      driver.setFailures({{law.surface, fault, std::nullopt}});
+      MixingInputs half;
+      half.speedbrake = 0.5;
+      return sent(driver.step(half, {8.0, 0.0}, kLong), law.surface);
+    };
+    EXPECT_DOUBLE_EQ(settled(SurfaceFault::kHardOverUp), 60.0);
+    EXPECT_DOUBLE_EQ(settled(SurfaceFault::kHardOverDown), 0.0);
+    EXPECT_NEAR(settled(SurfaceFault::kFloating), 0.3 * 8.0, 1e-9) << "flow from below lifts it";
+  }
+}
+
 TEST(SurfaceDriver, FloatingSurfaceLagsByItsTimeConstant) {
   SurfaceDriver driver(model());
   driver.engage(shown());

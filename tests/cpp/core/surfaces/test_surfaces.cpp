@@ -40,6 +40,15 @@ TEST(Surfaces, TableHasEachOnce) {
   EXPECT_EQ(datarefs.size(), 96u);
 }
 
+TEST(Surfaces, WhatOpensHasItsPlusUp) {
+  for (const char* name : {"spoiler1_wing1_left", "speedbrake2_wing2_right", "yaw_brake_wing3_left"}) {
+    EXPECT_EQ(upSign(surfaceNumber(name).value()), 1.0) << name;
+  }
+  for (const char* name : {"aileron1_wing2_left", "flap1_wing1_right", "elevator1_left", "rudder1_fin1"}) {
+    EXPECT_EQ(upSign(surfaceNumber(name).value()), -1.0) << name;
+  }
+}
+
 TEST(Surfaces, CommandIsTakenWhole) {
   const auto good = checkSurfaceCommand({"aileron1_wing1_left", "rudder1_fin1"}, {5.0f, -90.0f});
   ASSERT_FALSE(good.refusal);

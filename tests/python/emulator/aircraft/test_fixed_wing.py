@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from xplane_bridge import compiled
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.flight.flight_model import EngineFault, InitialState, SurfaceFault, SurfaceFaultKind
 
@@ -179,6 +180,34 @@ def test_surface_faults_as_seen_and_felt(twin, fault, expected):
     controls.roll = -0.5
     state = fly(twin, controls, 0.5)
     assert state.surfaces_deg["wing2l_ail1"] == pytest.approx(expected, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [
+        (SurfaceFaultKind.HARD_OVER_UP, 60.0),  # open
+        (SurfaceFaultKind.HARD_OVER_DOWN, 0.0),
+    ],
+)
+@pytest.mark.parametrize("in_cpp", [True, False])
+def test_the_upper_end_of_a_speed_brake_is_where_it_is_open(monkeypatch, in_cpp, kind, expected):
+    if not in_cpp:
+        monkeypatch.setattr(compiled, "core", None)
+    model = create_model("fixed_wing")
+    controls = model.reset(InitialState())
+    controls.speedbrake = 0.5
+    controls.surface_faults = {"wing1l_spo1": SurfaceFault(kind)}
+    surfaces = fly(model, controls, 1.5).surfaces_deg
+    assert surfaces["wing1l_spo1"] == pytest.approx(expected)
+    assert surfaces["wing1r_spo1"] == pytest.approx(30.0)
+
+
+def test_a_floating_speed_brake_is_lifted_by_the_angle_of_attack(twin):
+    controls = twin.reset(InitialState(airspeed_mps=60.0))
+    controls.surface_faults = {"wing1l_spo1": SurfaceFault(SurfaceFaultKind.FLOATING)}
+    state = fly(twin, controls, 0.5)
+    assert state.surfaces_deg["wing1l_spo1"] == pytest.approx(math.degrees(state.alpha_rad) / 2, abs=0.1)
+    assert state.alpha_rad > 0.0
 
 
 def test_reduced_and_lost_effect_are_felt(twin):

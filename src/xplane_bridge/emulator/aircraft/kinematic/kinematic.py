@@ -308,9 +308,9 @@ class KinematicModel:
                 elif fault.kind in (SurfaceFaultKind.CENTRED, SurfaceFaultKind.GONE, SurfaceFaultKind.FLOATING):
                     target = 0.0
                 elif fault.kind is SurfaceFaultKind.HARD_OVER_UP:
-                    target = spec.minimum_deg
+                    target = spec.fully_up_deg
                 elif fault.kind is SurfaceFaultKind.HARD_OVER_DOWN:
-                    target = spec.maximum_deg
+                    target = spec.fully_down_deg
                 elif fault.kind is SurfaceFaultKind.REDUCED:
                     target *= fault.value or 0.0
                 elif fault.kind is SurfaceFaultKind.SLOW:
