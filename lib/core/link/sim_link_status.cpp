@@ -102,25 +102,25 @@ bool SimLink::isOneWay(std::int64_t now_ns) const {
   return monitor_.alive() && live_counters_.data_datagrams > 0 && toSeconds(now_ns - answered_ns) > kAnswerPatienceS;
 }
 
-std::int32_t SimLink::versionNumber(std::int64_t now_ns) const {
-  // One that never answers may be another than the one that did before it went away.
-  if (!isOneWay(now_ns) || (answered_version_ > 0 && answered_epoch_ == monitor_.epoch())) {
-    return answered_version_;
-  }
-  const std::optional<BeaconSighting> beacon = beacons_.at(peer_, now_ns);
-  return beacon.has_value() ? beacon->version : options_.unheard_version;
-}
-
 void SimLink::updateVersion(std::int64_t now_ns) {
-  SimulatorVersion version{versionNumber(now_ns)};
-  // A silence says nothing of the version: one that was known holds until another is, or setPeer().
-  if (!version.known() || version.number == version_.number) {
+  const bool one_way = isOneWay(now_ns);
+  if (one_way && answered_epoch_ != monitor_.epoch()) {
+    answered_version_ = 0;  // one that never answers may be another than the one that did before it went away
+  }
+  std::int32_t number = answered_version_;
+  if (number == 0 && one_way) {
+    const std::optional<BeaconSighting> beacon = beacons_.at(peer_, now_ns);
+    number = beacon.has_value() ? beacon->version : options_.unheard_version;
+  } else if (number == 0) {
+    number = version_.number;  // a silence says nothing of it
+  }
+  if (number == version_.number) {
     return;
   }
-  if (options_.otherwise) {
-    version.otherwise = options_.otherwise(peer_, version.number);
+  version_ = {number};
+  if (version_.known() && options_.otherwise) {
+    version_.otherwise = options_.otherwise(peer_, number);
   }
-  version_ = version;
 }
 
 std::string SimLink::reasonOf(LinkState state) const {

@@ -218,7 +218,6 @@ class SimLink : public SimulatorPort {
   std::vector<std::string> findProblems(std::int64_t now_ns) const;
   void findSearchProblems(std::int64_t now_ns, std::vector<std::string>* problems) const;
   bool isOneWay(std::int64_t now_ns) const;
-  std::int32_t versionNumber(std::int64_t now_ns) const;
   void updateVersion(std::int64_t now_ns);
   std::string reasonOf(LinkState state) const;
   void publish(std::int64_t now_ns);
@@ -302,7 +301,7 @@ class SimLink : public SimulatorPort {
 
   std::int32_t answered_version_ = 0;  // X-Plane's own answer; 0: none yet
   std::uint32_t answered_epoch_ = 0;   // monitor_'s at that answer
-  SimulatorVersion version_;           // the last known versionNumber(), and what options_.otherwise says of it
+  SimulatorVersion version_;           // the last known, and what options_.otherwise says of it
   std::optional<bool> paused_;
   std::optional<float> sim_time_s_;
   LinkCounters live_counters_;  // of this thread; published by maintain()

@@ -397,22 +397,29 @@ TEST_F(ScriptedLink, DataWithoutAnswersIsOneWayAndItsVersionIsTheOption) {
 }
 
 TEST_F(ScriptedLink, OneThatNeverAnswersIsNotTakenForTheOneThatDid) {
-  SimLinkOptions options = defaults();
-  options.unheard_version = 122015;
-  options.data_output.enabled = true;
-  options.data_output.configure = false;
-  options.data_output.rows = {3};
-  makeLink(options);
-  arriveStatus(1000 * kMs, 50.0F);
-  for (int k = 0; k < 100; ++k) arrive((20'000 + 50 * k) * kMs, "data", data(1.0F));
-  runUntil(19'000 * kMs);
-  ASSERT_EQ(link_->status().state, LinkState::kLost);
-  EXPECT_EQ(link_->status().version.number, 115501);
-  runUntil(21'000 * kMs);
-  EXPECT_EQ(link_->status().version.number, 115501) << "it may still answer";
-  runUntil(24'000 * kMs);
-  EXPECT_TRUE(link_->status().one_way);
-  EXPECT_EQ(link_->status().version.number, 122015);
+  for (const std::int32_t given : {0, 122015}) {
+    wire_ = std::make_shared<ScriptedHub::Wire>();
+    SimLinkOptions options = defaults();
+    options.unheard_version = given;
+    options.data_output.enabled = true;
+    options.data_output.configure = false;
+    options.data_output.rows = {3};
+    makeLink(options);
+    arriveStatus(1000 * kMs, 50.0F);
+    for (int k = 0; k < 100; ++k) arrive((20'000 + 50 * k) * kMs, "data", data(1.0F));
+    runUntil(19'000 * kMs);
+    ASSERT_EQ(link_->status().state, LinkState::kLost);
+    EXPECT_EQ(link_->status().version.number, 115501);
+    runUntil(21'000 * kMs);
+    EXPECT_EQ(link_->status().version.number, 115501) << "it may still answer";
+    runUntil(24'000 * kMs);
+    EXPECT_TRUE(link_->status().one_way);
+    EXPECT_EQ(link_->status().version.number, given);
+    runUntil(26'000 * kMs);
+    EXPECT_EQ(link_->status().version.number, given) << "in a silence, too";
+    flight_.reset();
+    link_.reset();
+  }
 }
 
 TEST_F(ScriptedLink, AVersionIsJudgedOnceWhetherXPlaneAnswersItOrTheOptionGivesIt) {
