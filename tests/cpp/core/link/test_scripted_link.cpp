@@ -67,6 +67,15 @@ class ScriptedLink : public testing::Test {
     options.listen_for_beacon = false;
     return options;
   }
+  /// Data Output that X-Plane sends already.
+  static SimLinkOptions withRows(std::int32_t unheard_version = 0) {
+    SimLinkOptions options = defaults();
+    options.unheard_version = unheard_version;
+    options.data_output.enabled = true;
+    options.data_output.configure = false;
+    options.data_output.rows = {3};
+    return options;
+  }
   void makeLink(const SimLinkOptions& options = defaults()) {
     SimLinkCallbacks callbacks;
     callbacks.on_data = [this](const DataView& data, const ReceiveInfo&) { rows_.push_back(data[0].value(0)); };
@@ -209,11 +218,7 @@ TEST_F(ScriptedLink, OtherPeoplesDatagramsAndGarbageAreCounted) {
 }
 
 TEST_F(ScriptedLink, NoOtherProgramOfXPlanesComputerInjectsAState) {
-  SimLinkOptions options = defaults();
-  options.data_output.enabled = true;
-  options.data_output.configure = false;
-  options.data_output.rows = {3};
-  makeLink(options);
+  makeLink(withRows());
   const Endpoint sender{kXPlane.address, 49001}, program{kXPlane.address, 51234};
   arriveStatus(100 * kMs, 50.0F);
   arrive(110 * kMs, "flight", rref({{0, 1.0F}}));
@@ -360,12 +365,7 @@ TEST_F(ScriptedLink, AnXPlaneThatAnswersIsKeptWhereverItsBeaconComesFrom) {
 TEST_F(ScriptedLink, DataWithoutAnswersIsOneWayAndItsVersionIsTheOption) {
   for (const std::int32_t given : {0, 122015}) {
     wire_ = std::make_shared<ScriptedHub::Wire>();
-    SimLinkOptions options = defaults();
-    options.unheard_version = given;
-    options.data_output.enabled = true;
-    options.data_output.configure = false;
-    options.data_output.rows = {3};
-    makeLink(options);
+    makeLink(withRows(given));
     for (int k = 0; k < 100; ++k) {
       arrive((1000 + 50 * k) * kMs, "data", data(1.0F));
       if (k == 80) {
@@ -399,12 +399,7 @@ TEST_F(ScriptedLink, DataWithoutAnswersIsOneWayAndItsVersionIsTheOption) {
 TEST_F(ScriptedLink, OneThatNeverAnswersIsNotTakenForTheOneThatDid) {
   for (const std::int32_t given : {0, 122015}) {
     wire_ = std::make_shared<ScriptedHub::Wire>();
-    SimLinkOptions options = defaults();
-    options.unheard_version = given;
-    options.data_output.enabled = true;
-    options.data_output.configure = false;
-    options.data_output.rows = {3};
-    makeLink(options);
+    makeLink(withRows(given));
     arriveStatus(1000 * kMs, 50.0F);
     for (int k = 0; k < 100; ++k) arrive((20'000 + 50 * k) * kMs, "data", data(1.0F));
     runUntil(19'000 * kMs);
@@ -423,11 +418,7 @@ TEST_F(ScriptedLink, OneThatNeverAnswersIsNotTakenForTheOneThatDid) {
 }
 
 TEST_F(ScriptedLink, AVersionIsJudgedOnceWhetherXPlaneAnswersItOrTheOptionGivesIt) {
-  SimLinkOptions options = defaults();
-  options.unheard_version = 122015;
-  options.data_output.enabled = true;
-  options.data_output.configure = false;
-  options.data_output.rows = {3};
+  SimLinkOptions options = withRows(122015);
   std::vector<std::pair<Endpoint, std::int32_t>> judged;
   options.otherwise = [&judged](const Endpoint& peer, std::int32_t number) {
     judged.emplace_back(peer, number);
