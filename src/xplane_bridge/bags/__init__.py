@@ -22,7 +22,6 @@ messages (`MessageList`) are object columns. Units are those of the message defi
 from __future__ import annotations
 
 import functools
-import logging
 import struct
 from dataclasses import dataclass
 from heapq import merge
@@ -44,6 +43,7 @@ from xplane_bridge.bags.decoding import (
     wanted,
 )
 from xplane_bridge.bags.files import bags_in, ending, part_order, recording_of
+from xplane_bridge.bags.once import warn_once
 from xplane_bridge.bags.restarts import STATE_COLUMNS, Restarts, States
 from xplane_bridge.bags.units import Unit, later_units, parse_units
 from xplane_bridge.errors import XplaneBridgeError
@@ -51,7 +51,6 @@ from xplane_bridge.errors import XplaneBridgeError
 PathLike = Union[str, Path]
 #: The message beside which the bridge publishes all others.
 FLIGHT_STATE = "xplane_bridge/FlightState"
-_LOG = logging.getLogger(__name__)
 #: Messages are decoded so many at a time: bytes, and number of them.
 _PIECE_BYTES = 4 << 20
 _PIECE_MESSAGES = 8192
@@ -467,15 +466,9 @@ def _opened(path: Path) -> BagFile:
         msg = f"{path}: damaged or truncated ({error}); `rosbag reindex {path}` saves what can be saved"
         raise BagError(msg) from None
     if bag.lost is not None:
-        _say_cut_off(path, bag.lost)
+        happened = f"the recording {ending(path)}"
+        warn_once(f"{path}: {happened}; read to its last whole chunk, without {bag.lost} bytes behind it")
     return bag
-
-
-@functools.lru_cache(maxsize=None)
-def _say_cut_off(path: Path, lost: int) -> None:
-    """Once for a file, on stderr unless the program has set up logging."""
-    text = "%s: the recording %s; read to its last whole chunk, without %d bytes behind it"
-    _LOG.warning(text, path, ending(path), lost)
 
 
 def _damaged(file: BagFile, err: Exception) -> BagError:

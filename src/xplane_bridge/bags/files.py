@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import functools
-import logging
 import re
 from pathlib import Path
 from typing import Union
 
 from xplane_bridge.bags.chunks import BagFile, DamagedError
+from xplane_bridge.bags.once import warn_once
 
-_LOG = logging.getLogger(__name__)
 #: Follows the name of a bag while it is recorded, and stays where the recorder was killed.
 _ACTIVE = ".active"
 #: Ends the name of each part of a split recording.
@@ -54,16 +52,9 @@ def _has_chunk(path: Path) -> bool:
     try:
         BagFile(path, probe=True).close()
     except DamagedError as error:
-        _say_left_out(path, str(error))
+        why = "the recording was cut off before its first whole chunk, or has just begun"
+        warn_once(f"{path}: left out ({error}); {why}")
         return False
     except OSError:
         pass  # as of any other bag, the reason is said when it is opened
     return True
-
-
-@functools.lru_cache(maxsize=None)
-def _say_left_out(path: Path, why: str) -> None:
-    """Once for a file, on stderr unless the program has set up logging."""
-    _LOG.warning(
-        "%s: left out (%s); the recording was cut off before its first whole chunk, or has just begun", path, why
-    )

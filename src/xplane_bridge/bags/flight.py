@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import logging
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, Optional
 
@@ -12,15 +10,13 @@ import numpy as np
 from xplane_bridge.bags import FLIGHT_STATE, BagError, Bags, Table, TopicInfo
 from xplane_bridge.bags.cameras import Camera, cameras
 from xplane_bridge.bags.events import RecordedEvent, events_of
+from xplane_bridge.bags.once import warn_once
 from xplane_bridge.bags.segments import disordered, segments
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from xplane_bridge.bags.columns import ColumnFile
     from xplane_bridge.bags.units import Unit
 
-_LOG = logging.getLogger(__name__)
 ODOMETRY = "nav_msgs/Odometry"
 LABEL = "std_msgs/String"
 #: Role in a flight to message type.
@@ -154,16 +150,9 @@ def state_epochs(bags: Bags, state: Table) -> np.ndarray:
     mixed = disordered(epoch, state["sim_time_unwrapped"])
     if not mixed.any():
         return epoch
-    _say(bags.paths[0], int(mixed.sum()))
-    return np.cumsum(np.append(False, (np.diff(epoch) != 0) | mixed[1:] | mixed[:-1]))
-
-
-@functools.lru_cache(maxsize=None)
-def _say(path: Path, states: int) -> None:
-    """Once for a flight, which several programs' parts may cut."""
-    _LOG.warning(
-        "%s: the host's clock was set back in flight: by their stamps %d flight states lie among others of another "
-        "time, and each stands for itself; let the clock be slewed, not stepped, while flights are recorded",
-        path,
-        states,
+    warn_once(
+        f"{bags.paths[0]}: the host's clock was set back in flight: by their stamps {mixed.sum()} flight states lie "
+        "among others of another time, and each stands for itself; let the clock be slewed, not stepped, while flights "
+        "are recorded"
     )
+    return np.cumsum(np.append(False, (np.diff(epoch) != 0) | mixed[1:] | mixed[:-1]))

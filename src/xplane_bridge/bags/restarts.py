@@ -20,17 +20,15 @@ are read, so that an epoch and a simulator time are of one frame.
 
 from __future__ import annotations
 
-import functools
-import logging
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterable, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
 from xplane_bridge.bags.chunks import BagFile
+from xplane_bridge.bags.once import warn_once
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, rounding
 
-_LOG = logging.getLogger(__name__)
 #: Where frames do not go on, by less only messages that overtook each other go back: they are sorted.
 _FALL_NS = 10**9
 #: Stamps that are so close to the time of receipt are left as they are unless that was moved.
@@ -260,7 +258,8 @@ class Restarts:
         by = np.append(0, np.cumsum(stamp[new - 1] - stamp[new] + passed))
         for why, rows in ((_RESTARTED, ~by_clock), (_SET_BACK, by_clock)):
             if rows.any():
-                _say(self._path, why, tuple((by[1:][rows] / 1e9).tolist()))
+                seconds = ", ".join(f"{each:.3f}" for each in (by[1:][rows] / 1e9).tolist())
+                warn_once(f"{self._path}: {why % seconds}")
         return _Found(time[new - 1] + received // 2, by)
 
 
@@ -272,12 +271,6 @@ def _epochs(states: States) -> _Found:
     new = np.flatnonzero(states.counted_anew() & (passed > _INTERRUPTED_NS) & behind) + 1
     counted = [int(run.max()) + 1 for run in np.split(states.epoch, new)[:-1]]
     return _Found(time[new - 1] + passed[new - 1] // 2, np.cumsum([0, *counted]))
-
-
-@functools.lru_cache(maxsize=None)
-def _say(path: Path, why: str, by: Tuple[float, ...]) -> None:
-    """Once for a flight, on stderr unless the program has set up logging."""
-    _LOG.warning(f"%s: {why}", path, ", ".join(f"{seconds:.3f}" for seconds in by))
 
 
 def falls(time: np.ndarray) -> np.ndarray:
