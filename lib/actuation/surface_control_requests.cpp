@@ -200,8 +200,7 @@ std::string SurfaceControl::heldElsewhere() const {
   }
   if (overrides_->releasePending(core::kSurfaceOverride)) {
     return "tx_node's release of override_control_surfaces is not shown yet, and is repeated; where that lasts, "
-           "another "
-           "program sets it and must give it back";
+           "another program sets it and must give it back";
   }
   return "another program has set override_control_surfaces and must give it back";
 }

@@ -65,8 +65,7 @@ FlightStateAssembler::FlightStateAssembler(const Options& options)
 
 std::unique_ptr<RrefFrameAssembler> FlightStateAssembler::makeFrames() const {
   RrefFrameAssembler::Options frames = RrefFrameAssembler::Options::atRate(options_.rate);
-  frames.join_window = std::max(frames.join_window,
-                                options_.transport == Transport::kRref ? options_.join_window : kSupplementJoinWindow);
+  if (options_.transport != Transport::kRref) frames.join_window = std::max(frames.join_window, kSupplementJoinWindow);
   return std::make_unique<RrefFrameAssembler>(decoder_.requests().size(), 0, frames);
 }
 

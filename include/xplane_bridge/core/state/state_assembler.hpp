@@ -41,7 +41,6 @@ class FlightStateAssembler {
     double max_supplement_age = 1.0;          ///< kData: values from RREF older than this are unknown [s]
     double max_external_position_age = 0.25;  ///< RPOS and X-Plane Connect positions older than this are not used [s]
     double jump_distance = 100.0;             ///< off the predicted position by more: a reset [m]
-    double join_window = 0.005;               ///< kRref: pieces of one frame arrive within this [s], at least
     ClockFilter::Options clock;
   };
 
