@@ -31,6 +31,10 @@ class Window(NamedTuple):
     quality: int = 0
 
 
+#: For tests that do not look at the delay of pictures: few, as drawing and comparing them takes nearly all of the time.
+FEW = Window(0.05, every=5)
+
+
 def belly(delay: float) -> Window:
     """Forward and 30 degrees down, which is none of the views with a name; a product of two quaternions, by hand."""
     sine, cosine = math.sin(_HALF), math.cos(_HALF)
@@ -125,14 +129,14 @@ def test_delay_and_response_are_found_and_drawn(tmp_path: Path, capsys: pytest.C
 
 def test_a_pause_leaves_the_delay_of_the_rest(tmp_path: Path) -> None:
     bag, numbers = tmp_path / "paused.bag", tmp_path / "delay.json"
-    write_bag(bag, Window(0.085), pause=15.0)
+    write_bag(bag, Window(0.085, every=4), pause=15.0)
     assert main([str(bag), "--json", str(numbers)]) == 0
     assert json.loads(numbers.read_text())["display_delay"]["delay"] == pytest.approx(0.085, abs=0.005)
 
 
 def test_what_is_not_determined_is_no_number(tmp_path: Path) -> None:
     bag, plot, numbers = tmp_path / "still.bag", tmp_path / "delay.png", tmp_path / "delay.json"
-    write_bag(bag, Window(0.05), aileron=0.0)
+    write_bag(bag, FEW, aileron=0.0)
     assert main([str(bag), "--plot", str(plot), "--json", str(numbers)]) == 0
     text = numbers.read_text()
     assert "Infinity" not in text
@@ -144,14 +148,14 @@ def test_what_is_not_determined_is_no_number(tmp_path: Path) -> None:
 
 def test_sending_a_command_again_does_not_make_the_response_faster(tmp_path: Path) -> None:
     bag, numbers = tmp_path / "flight.bag", tmp_path / "delay.json"
-    write_bag(bag, Window(0.05), refresh=True)
+    write_bag(bag, FEW, refresh=True)
     assert main([str(bag), "--json", str(numbers)]) == 0
     assert json.loads(numbers.read_text())["roll command"]["delay"] == pytest.approx(0.045, abs=0.002)
 
 
 def test_surfaces_sent_one_by_one_are_no_commands_of_axes(tmp_path: Path) -> None:
     bag, numbers = tmp_path / "flight.bag", tmp_path / "delay.json"
-    write_bag(bag, Window(0.05), surfaces_too=True)
+    write_bag(bag, FEW, surfaces_too=True)
     assert main([str(bag), "--json", str(numbers)]) == 0
     assert json.loads(numbers.read_text())["roll command"]["delay"] == pytest.approx(0.045, abs=0.002)
 
@@ -159,7 +163,7 @@ def test_surfaces_sent_one_by_one_are_no_commands_of_axes(tmp_path: Path) -> Non
 def test_a_controller_slower_than_the_frames_has_a_delay(tmp_path: Path) -> None:
     """It holds its commands for three frames: on average they are half of that older than when they came."""
     bag, numbers = tmp_path / "flight.bag", tmp_path / "delay.json"
-    write_bag(bag, Window(0.05), refresh=True, held=True)
+    write_bag(bag, FEW, refresh=True, held=True)
     assert main([str(bag), "--json", str(numbers)]) == 0
     # The first frame that shows a value comes 5 ms after that.
     assert json.loads(numbers.read_text())["roll command"]["delay"] == pytest.approx(0.045 + 0.025, abs=0.006)
@@ -182,7 +186,7 @@ def test_of_several_cameras_one_is_measured_about_its_own_line_of_sight(
 
 def test_too_little_motion_is_one_line_and_exit_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = tmp_path / "calm.bag"
-    write_bag(bag, Window(0.05), scale=0.01)
+    write_bag(bag, FEW, scale=0.01)
     assert main([str(bag)]) == 1
     error = capsys.readouterr().err.strip()
     assert "\n" not in error
