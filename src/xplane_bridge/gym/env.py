@@ -21,7 +21,8 @@ from xplane_bridge.in_process.aircraft import Conditions, initial_state
 
 OVERSPEED = "faster than the never-exceed speed"
 TIME = "time is up"
-_RENDERED = (640, 480)
+#: Width and height [px] of what `render` gives.
+RENDERED = (640, 480)
 _FRAME_RATES = (20.0, 240.0)
 _MOST_PIXELS = 4096
 #: How often a start is drawn before it is said that none can be flown.
@@ -63,26 +64,28 @@ class FlyEnv(gymnasium.Env[Any, Any]):
         frame_rate: float = 60.0,
         frames: int = 2,
         duration: float = 60.0,
-        image: Optional[Tuple[int, int]] = None,
+        image: Optional[Sequence[int]] = None,
         bridge: Optional[str] = None,
         render_mode: Optional[str] = None,
     ) -> None:
         _check(frame_rate, frames, duration, image, render_mode)
-        self._info = info = create_model(aircraft).info
+        model = create_model(aircraft)
+        self._info = info = model.info
         self._task = task()
         self._observer = Observer(tuple(fields or self._task.fields or DEFAULT_FIELDS))
         #: What makes commands of actions.
         self.commander = Commander(tuple(axes or self._task.axes or DEFAULT_AXES[aircraft]), info)
-        self._episodes = Episodes(info, frame_rate, {**self._task.episode, **(episode or {})})
+        self._episodes = Episodes(model, frame_rate, {**self._task.episode, **(episode or {})})
         self._frames, self._longest = frames, duration - 0.5 / frame_rate
         self.render_mode = render_mode
         self.metadata = {**self.metadata, "render_fps": round(frame_rate / frames)}
         self.action_space = self.commander.space
         self.observation_space = self._observer.space
-        self._image = image
+        self._image = None if image is None else (image[0], image[1])
         self._cameras: Dict[Tuple[int, int], Any] = {}
-        if image is not None:
-            picture = spaces.Box(0, 255, (image[1], image[0], 3), np.uint8)
+        if self._image is not None:
+            width, height = self._image
+            picture = spaces.Box(0, 255, (height, width, 3), np.uint8)
             self.observation_space = spaces.Dict({"state": self._observer.space, "image": picture})
         self._bridged = bridge is not None
         self._flight = _flight(bridge)
@@ -115,7 +118,7 @@ class FlyEnv(gymnasium.Env[Any, Any]):
 
         Raises:
             FlightModelError: The aircraft cannot fly like this; where that hangs on what is drawn, in none of 20 draws.
-            GymError, CampaignError, NotFlownError, ScenarioError: An option makes no sense.
+            GymError, CampaignError: An option makes no sense.
         """
         super().reset(seed=seed)
         episodes = self._episodes.fixed(options or {})
@@ -160,7 +163,7 @@ class FlyEnv(gymnasium.Env[Any, Any]):
 
     def render(self) -> Optional[np.ndarray]:
         """The forward view, 640x480; None where no `render_mode` was asked for."""
-        return self._picture(_RENDERED) if self.render_mode == "rgb_array" else None
+        return self._picture(RENDERED) if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
         """Ends what was started for it; may be called again."""
@@ -207,14 +210,13 @@ class FlyEnv(gymnasium.Env[Any, Any]):
 
         truth = self._flight.truth
         anchor = (truth.latitude_deg, truth.longitude_deg)
-        sizes = {size for size in (self._image, _RENDERED if self.render_mode else None) if size is not None}
-        self._cameras = {(width, height): Camera((width, height), anchor) for width, height in sizes}
+        sizes = {size for size in (self._image, RENDERED if self.render_mode else None) if size is not None}
+        self._cameras = {size: Camera(size, anchor) for size in sizes}
 
     def _picture(self, size: Tuple[int, int]) -> np.ndarray:
-        width, height = size
-        if (width, height) not in self._cameras:
+        if size not in self._cameras:
             raise GymError("render: no episode has begun; call reset first")
-        picture: np.ndarray = self._cameras[width, height].picture(self._flight.truth)
+        picture: np.ndarray = self._cameras[size].picture(self._flight.truth)
         return picture
 
 
@@ -241,7 +243,7 @@ def _flight(bridge: Optional[str]) -> Flight:
 
 
 def _check(
-    frame_rate: float, frames: int, duration: float, image: Optional[Tuple[int, int]], render_mode: Optional[str]
+    frame_rate: float, frames: int, duration: float, image: Optional[Sequence[int]], render_mode: Optional[str]
 ) -> None:
     low, high = _FRAME_RATES
     if not (is_number(frame_rate) and low <= frame_rate <= high):

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Set, Tuple, Union
+from itertools import combinations, product
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Set, Tuple, Union
 
 import numpy as np
 
 from xplane_bridge.campaign.distributions import Parameter, parse_parameter
 from xplane_bridge.constants import FAILURE_KINDS
-from xplane_bridge.emulator.flight.flight_model import ModelInfo
+from xplane_bridge.emulator.flight.flight_model import FlightModel
 from xplane_bridge.emulator.scenario_pilot import START
 from xplane_bridge.errors import is_number
 from xplane_bridge.gym.errors import GymError
 from xplane_bridge.in_process.aircraft import AUTO, LOADING, WEATHER, Conditions
+from xplane_bridge.in_process.failures import Failures, NotFlownError
 
 ATTITUDE = ("roll", "pitch")
 #: What can be given, in the order in which it is drawn.
 KEYS = (*START, *ATTITUDE, *WEATHER, *LOADING)
-_FAILURE_KEYS = ("name", "kind", "value", "at")
+_ACTION_KEYS = ("name", "kind", "value")
+_FAILURE_KEYS = (*_ACTION_KEYS, "at")
 #: Shares drawn for a failure: of its name, kind, value and time.
 _FAILURE_SHARES = len(_FAILURE_KEYS)
+#: Kinds of failure that take a value.
+_WITH_VALUE = ("stuck", "reduced", "slow")
 _MOST_SEED = 2**31
 #: What a steady flight hangs on; where the aircraft stands over the ground also the wind against it.
 _TRIMMED = ("on_ground", "altitude", "speed", "temperature_offset", "sea_level_pressure", *LOADING)
@@ -58,7 +63,10 @@ def _plain(item: Any) -> Any:
 def _chosen(key: str, item: Any, where: str = "episode.") -> _Chosen:
     item = _plain(item)
     if isinstance(item, Mapping):
-        return parse_parameter(key, item, where)
+        parameter = parse_parameter(key, item, where)
+        if not parameter.numeric and key not in ("name", "kind"):
+            raise GymError(f"{where}{key}.choice: {item['choice']!r}; expected a list of numbers")
+        return parameter
     if key == "on_ground" and isinstance(item, bool):
         return float(item)
     if key == "fuel" and isinstance(item, list) and all(map(is_number, item)):
@@ -75,9 +83,13 @@ def _value(chosen: Optional[_Chosen], share: float) -> Any:
     return chosen.at(share) if isinstance(chosen, Parameter) else chosen
 
 
-def _possible(chosen: _Chosen) -> Tuple[Any, ...]:
-    """All that may be drawn."""
-    return chosen.values if isinstance(chosen, Parameter) else (chosen,)
+def _possible(chosen: Optional[_Chosen]) -> Tuple[Any, ...]:
+    """What may be drawn: each choice, or both ends of a distribution."""
+    if not isinstance(chosen, Parameter):
+        return (chosen,)
+    count = len(chosen.values)
+    shares = [(i + 0.5) / count for i in range(count)] if chosen.kind == "choice" else [0.0, 1.0]
+    return tuple(chosen.at(share) for share in shares)
 
 
 def _failure(index: int, item: Any) -> Dict[str, Any]:
@@ -97,20 +109,33 @@ def _failure(index: int, item: Any) -> Dict[str, Any]:
     return out
 
 
+def _action(item: Mapping[str, Any], name: str, kind: str, value: Optional[float]) -> Dict[str, Any]:
+    """A scenario's `failure`; beside a drawn kind, a value is for those that take one."""
+    if isinstance(item["kind"], Parameter) and kind not in _WITH_VALUE:
+        value = None
+    return {"name": name, "kind": kind, "value": value, "clear": False}
+
+
+def _possible_actions(item: Mapping[str, Any]) -> Iterator[Dict[str, Any]]:
+    for drawn in product(*(_possible(item.get(key)) for key in _ACTION_KEYS)):
+        yield _action(item, *drawn)
+
+
 class Episodes:
     """What episodes are drawn from.
 
     Args:
-        info: Of the aircraft.
+        model: Of the aircraft; it is not flown.
         frame_rate: [Hz]
         given: Keys of `KEYS` to a number or a distribution as in a campaign file (`fuel`: of each tank), `failures` to
             a list of failures with `name`, `kind`, `value`, `at`, and `seed` (of the turbulence).
 
     Raises:
-        GymError, CampaignError: Something in it is none of these.
+        GymError, CampaignError: Something in it is none of these, or a failure that may be drawn is none that this
+            aircraft can have.
     """
 
-    def __init__(self, info: ModelInfo, frame_rate: float, given: Mapping[str, Any]) -> None:
+    def __init__(self, model: FlightModel, frame_rate: float, given: Mapping[str, Any]) -> None:
         unknown = sorted(set(given) - {*KEYS, "failures", "seed"})
         if unknown:
             raise GymError(f"episode.{unknown[0]}: unknown key; expected {', '.join(KEYS)}, failures, seed")
@@ -120,14 +145,16 @@ class Episodes:
         seed = given.get("seed")
         if seed is not None and (isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0):
             raise GymError(f"episode.seed: {seed!r}; expected a whole number, 0 or more")
-        self._info, self._frame_rate, self._given = info, frame_rate, dict(given)
+        self._model, self._info = model, model.info
+        self._frame_rate, self._given = frame_rate, dict(given)
         self._seed = seed
         self._chosen = {key: _chosen(key, given[key]) for key in KEYS if given.get(key) is not None}
         self._failures = [_failure(i, item) for i, item in enumerate(failures)]
+        self._check_failures()
 
     def fixed(self, options: Mapping[str, Any]) -> Episodes:
         """These with some of it chosen otherwise."""
-        return Episodes(self._info, self._frame_rate, {**self._given, **options}) if options else self
+        return Episodes(self._model, self._frame_rate, {**self._given, **options}) if options else self
 
     @property
     def vary(self) -> bool:
@@ -146,7 +173,29 @@ class Episodes:
         out |= {"altitude", "speed"} if "on_ground" in out else set()
         out |= {"cg_aft"} if "payload" in out else set()
         given = {key: value for key, value in self._given.items() if key in KEYS and key not in out}
-        return Episodes(self._info, self._frame_rate, given).draw(np.random.default_rng(0)).conditions
+        return Episodes(self._model, self._frame_rate, given).draw(np.random.default_rng(0)).conditions
+
+    def _check_failures(self) -> None:
+        """Tries all that may be drawn, each alone and beside the others."""
+        by_name: List[Dict[str, Dict[str, Any]]] = []
+        for index, item in enumerate(self._failures):
+            actions = list(_possible_actions(item))
+            for action in actions:
+                self._try(index, action)
+            by_name.append({action["name"]: action for action in actions})
+        for earlier, index in combinations(range(len(by_name)), 2):
+            for both in product(by_name[earlier].values(), by_name[index].values()):
+                self._try(index, *both)
+
+    def _try(self, index: int, *actions: Mapping[str, Any]) -> None:
+        trial = Failures(self._model)
+        try:
+            for action in actions:
+                trial.act(action)
+        except NotFlownError as error:
+            varies = any(isinstance(self._failures[index].get(key), Parameter) for key in _ACTION_KEYS)
+            remedy = " (this may be drawn: take it out of the choice, or clip the distribution)" if varies else ""
+            raise GymError(f"episode.failures[{index}]: {error}{remedy}") from None
 
     def _drawn(self) -> Set[str]:
         return {key for key, chosen in self._chosen.items() if isinstance(chosen, Parameter)}
@@ -189,4 +238,4 @@ class Episodes:
     def _drawn_failure(item: Mapping[str, Any], shares: np.ndarray) -> Failure:
         drawn: List[Any] = [_value(item.get(key), share) for key, share in zip(_FAILURE_KEYS, shares)]
         name, kind, value, at = drawn
-        return Failure(at, {"name": name, "kind": kind, "value": value, "clear": False})
+        return Failure(at, _action(item, name, kind, value))

@@ -7,7 +7,6 @@ from typing import Any, List, Mapping, Protocol
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModelError, ModelState
 from xplane_bridge.gym.episodes import Episode, Failure
 from xplane_bridge.in_process.aircraft import AUTO, Aircraft
-from xplane_bridge.in_process.failures import Failures
 
 #: How an episode can end without the task's doing.
 CRASHED, GAVE_UP = "crashed", "model gave up"
@@ -58,12 +57,8 @@ class InProcessFlight:
 
         Raises:
             FlightModelError: The aircraft cannot fly like this.
-            NotFlownError, ScenarioError: It has no such part to break.
         """
         self._aircraft = Aircraft(episode.conditions)
-        trial = Failures(self._aircraft.model)
-        for failure in episode.failures:  # a wrong one raises now, not when it is due
-            trial.act(failure.action)
         self._to_come = list(episode.failures)
         # The first state that the bridge can publish is that of the first frame: no command acts in it.
         self._fly()

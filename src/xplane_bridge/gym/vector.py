@@ -14,7 +14,7 @@ import pickle
 import select
 import time
 from multiprocessing.connection import Connection
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, Iterator, List, Mapping, NamedTuple, NoReturn, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from gymnasium import spaces
@@ -23,10 +23,10 @@ from gymnasium.vector.utils import batch_space
 
 from xplane_bridge.emulator.flight.flight_model import FlightModelError
 from xplane_bridge.errors import XplaneBridgeError
-from xplane_bridge.gym.env import FlyEnv, Observation
+from xplane_bridge.gym.env import RENDERED, FlyEnv, Observation
 from xplane_bridge.gym.errors import GymError
 
-_STEP, _RESET, _CLOSE = b"s", b"r", b"c"
+_STEP, _RESET, _RENDER, _CLOSE = b"s", b"r", b"p", b"c"
 #: How long a worker may take to end by itself [s]: over the nodes it ends those and a ROS master.
 _PATIENCE_S = 20.0
 #: How long a message is looked for before the process sleeps until it comes [s].
@@ -84,11 +84,13 @@ class _Layout(NamedTuple):
         }
 
 
-def _layout(observation: spaces.Space[Any], action: Any) -> _Layout:
+def _layout(observation: spaces.Space[Any], action: Any, renders: bool) -> _Layout:
     parts: Mapping[str, Any] = observation.spaces if isinstance(observation, spaces.Dict) else {"": observation}
     columns = {f"observation {name}": (part.dtype.str, part.shape) for name, part in parts.items()}
     columns.update(action=(action.dtype.str, action.shape), reward=("<f8", ()), sim_time=("<f8", ()))
     columns.update(terminated=("|b1", ()), truncated=("|b1", ()))
+    if renders:
+        columns["picture"] = ("|u1", (RENDERED[1], RENDERED[0], 3))
     return _Layout(columns)
 
 
@@ -124,6 +126,11 @@ class _Worker:
             if info:
                 infos[self._first + i] = info
         return infos
+
+    def render(self) -> _Infos:
+        for i, env in enumerate(self._envs):
+            self._arrays["picture"][i] = env.render()
+        return {}
 
     def close(self) -> None:
         for env in self._envs:
@@ -165,7 +172,10 @@ def _work(
             order = inbox.receive()
             if order[:1] == _CLOSE:
                 break
-            answer = worker.step() if order[:1] == _STEP else worker.reset(*pickle.loads(order[1:]))
+            if order[:1] == _RESET:
+                answer = worker.reset(*pickle.loads(order[1:]))
+            else:
+                answer = worker.step() if order == _STEP else worker.render()
             connection.send_bytes(pickle.dumps(answer) if answer else b"")
     except (EOFError, KeyboardInterrupt):
         pass
@@ -194,6 +204,7 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
     """`num_envs` of `FlyEnv`, with the observations that they have alone with the seeds `seed + index`.
 
     An episode that has ended begins anew with the next step, whose action is not flown (gymnasium's NEXT_STEP).
+    What interrupts a call that waits for workers, Ctrl-C for one, closes the environments.
 
     Args:
         num_envs: How many.
@@ -214,14 +225,14 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
         if num_envs < 1 or (workers is not None and workers < 1):
             raise GymError(f"num_envs: {num_envs!r}, workers: {workers!r}; expected 1 or more")
         model = FlyEnv(**arguments)  # raises what is wrong before a process is started
-        self.num_envs, self.render_mode = num_envs, None
+        self.num_envs, self.render_mode = num_envs, model.render_mode
         self.single_observation_space, self.single_action_space = model.observation_space, model.action_space
         self.observation_space = batch_space(model.observation_space, num_envs)
         self.action_space = batch_space(model.action_space, num_envs)
         self.metadata = {**model.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
         self._commander = model.commander
         model.close()
-        layout = _layout(model.observation_space, model.action_space)
+        layout = _layout(model.observation_space, model.action_space, self.render_mode is not None)
         processes: Any = multiprocessing.get_context(context)
         memory = layout.allocate(processes, num_envs)
         self._arrays = layout.arrays(memory, num_envs)
@@ -253,16 +264,16 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
             options: As `FlyEnv.reset` has them, for all.
 
         Raises:
-            GymError, CampaignError, FlightModelError, NotFlownError, ScenarioError: As `FlyEnv.reset`; the environments
-                stay open and are to be reset again.
+            GymError, CampaignError, FlightModelError: As `FlyEnv.reset`; the environments stay open and are to be reset
+                again.
             WorkerError: A worker has ended; the environments are closed.
         """
         seeds = _seeds(seed, self.num_envs)
         options = None if options is None else dict(options)
         self._flying = False
         shares = [seeds[first:end] for first, end in self._rows]
-        self._send([_RESET + pickle.dumps((share, options)) for share in shares[:-1]])
-        infos = self._receive(lambda: self._own.reset(shares[-1], options))
+        orders = [_RESET + pickle.dumps((share, options)) for share in shares[:-1]]
+        infos = self._gather(self._call(orders, lambda: self._own.reset(shares[-1], options)))
         self._flying = True
         return self._observations(), infos
 
@@ -277,33 +288,52 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
         self._check(given)
         arrays = self._arrays
         arrays["action"][:] = given
-        self._send([_STEP] * len(self._connections))
-        infos = self._receive(self._own.step)
+        infos = self._gather(self._call([_STEP] * len(self._connections), self._own.step))
         reward, terminated, truncated = (arrays[name].copy() for name in ("reward", "terminated", "truncated"))
         return self._observations(), reward, terminated, truncated, infos
 
+    def render(self) -> Optional[Tuple[np.ndarray, ...]]:
+        """The forward view of each, 640x480; None where no `render_mode` was asked for.
+
+        Raises:
+            GymError: There are no episodes.
+            WorkerError: A worker has ended; the environments are closed.
+        """
+        if self.render_mode is None:
+            return None
+        self._check_flying("render")
+        self._call([_RENDER] * len(self._connections), self._own.render)
+        return tuple(self._arrays["picture"].copy())
+
     def close_extras(self, **_kwargs: Any) -> None:
-        """Ends the workers."""
-        for connection in self._connections:
-            with contextlib.suppress(OSError):  # it has ended
-                connection.send_bytes(_CLOSE)
-        for connection, process in zip(self._connections, self._processes):
-            process.join(_PATIENCE_S)
-            if process.is_alive():
-                process.terminate()
-                process.join()
-            connection.close()
-        self._own.close()
+        """Ends the workers; where this is interrupted, at once."""
+        self.closed = True
+        try:
+            for connection in self._connections:
+                with contextlib.suppress(OSError):  # it has ended
+                    connection.send_bytes(_CLOSE)
+            for process in self._processes:
+                process.join(_PATIENCE_S)
+        finally:
+            for connection, process in zip(self._connections, self._processes):
+                if process.is_alive():
+                    process.terminate()
+                    process.join()
+                connection.close()
+            self._own.close()
 
     def _observations(self) -> Observation:
         if isinstance(self.single_observation_space, spaces.Dict):
             return {name: self._arrays[f"observation {name}"].copy() for name in self.single_observation_space.spaces}
         return self._arrays["observation "].copy()
 
+    def _check_flying(self, call: str) -> None:
+        if not (self.closed or self._flying):
+            raise GymError(f"{call}: no episodes are being flown; call reset first")
+
     def _check(self, actions: np.ndarray) -> None:
         """Refuses what an environment would refuse, before any of them flies."""
-        if not (self.closed or self._flying):
-            raise GymError("step: no episodes are being flown; call reset first")
+        self._check_flying("step")
         if actions.shape != self.action_space.shape:
             raise GymError(f"actions of shape {actions.shape}; expected {self.action_space.shape}")
         flown = ~(self._arrays["terminated"] | self._arrays["truncated"])  # the others begin anew
@@ -313,51 +343,57 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
             except GymError as error:
                 raise GymError(f"environment {index}: {error}") from None
 
-    def _send(self, orders: Sequence[bytes]) -> None:
+    def _call(
+        self, orders: Sequence[bytes], own: Callable[[], Union[_Infos, Exception]]
+    ) -> List[Union[_Infos, Exception]]:
+        """Answers of all, of this process first, which flies its share while the workers fly theirs."""
         if self.closed:
-            raise GymError("the environments are closed")
+            raise GymError("the environments are closed; make new ones")
+        try:
+            self._send(orders)
+            return [self._answer_of(own), *self._receive()]
+        except BaseException:
+            # An answer that is left in its pipe would be taken for that of the next order.
+            self.close()
+            raise
+
+    def _send(self, orders: Sequence[bytes]) -> None:
         for i, (connection, order) in enumerate(zip(self._connections, orders)):
             try:
                 connection.send_bytes(order)
             except OSError:
                 self._fail(i)
 
-    def _receive(self, fly_own: Callable[[], Union[_Infos, Exception]]) -> Dict[str, Any]:
-        """Flies this process's share, and gathers the infos of all; raises what one of them has refused."""
-        infos: Dict[str, Any] = {}
-        refused: List[Exception] = []
+    @staticmethod
+    def _answer_of(own: Callable[[], Union[_Infos, Exception]]) -> Union[_Infos, Exception]:
         try:
-            own = fly_own()
+            return own()
         except Exception as error:
-            self.close()
             raise WorkerError(f"{type(error).__name__}: {error}") from error
-        if isinstance(own, Exception):
-            refused.append(own)
-            own = {}
-        for index, info in own.items():
-            infos = self._add_info(infos, info, index)
+
+    def _receive(self) -> Iterator[Union[_Infos, Exception]]:
         for i, inbox in enumerate(self._inboxes):
             try:
-                answer = inbox.receive()
+                message = inbox.receive()
             except (EOFError, OSError):
                 self._fail(i)
-            if not answer:
-                continue
-            received = pickle.loads(answer)
-            if isinstance(received, str):
-                self.close()
-                raise WorkerError(received)
-            if isinstance(received, Exception):
-                refused.append(received)
-                continue
-            for index, info in received.items():
+            answer = pickle.loads(message) if message else {}
+            if isinstance(answer, str):
+                raise WorkerError(answer)
+            yield answer
+
+    def _gather(self, answers: Sequence[Union[_Infos, Exception]]) -> Dict[str, Any]:
+        """Infos of all as one; raises what one of them has refused."""
+        infos: Dict[str, Any] = {}
+        for answer in answers:
+            if isinstance(answer, Exception):
+                raise answer
+            for index, info in answer.items():
                 infos = self._add_info(infos, info, index)
-        if refused:
-            raise refused[0]
         infos["sim_time"], infos["_sim_time"] = self._arrays["sim_time"].copy(), np.ones(self.num_envs, bool)
         return infos
 
-    def _fail(self, i: int) -> None:
+    def _fail(self, i: int) -> NoReturn:
         """A worker is gone: says so, or what it has said last."""
         connection, process = self._connections[i], self._processes[i]
         process.join(_PATIENCE_S)
@@ -367,5 +403,4 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
                 reason = pickle.loads(connection.recv_bytes())
         except (EOFError, OSError):
             pass
-        self.close()
         raise WorkerError(f"worker {i} of {len(self._processes)}: {reason}")

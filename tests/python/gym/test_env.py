@@ -18,7 +18,6 @@ from xplane_bridge.emulator.flight.flight_model import FlightModelError
 from xplane_bridge.gym import FlyEnv, Hover, Task, WingsLevel
 from xplane_bridge.gym.errors import GymError
 from xplane_bridge.gym.spaces import FIELDS
-from xplane_bridge.in_process.failures import NotFlownError
 
 AIRCRAFT = ("FixedWing", "Multirotor", "Tiltrotor")
 STICK = ("roll", "pitch", "yaw")
@@ -294,6 +293,11 @@ def test_pictures_show_the_flight_and_are_the_same_again() -> None:
     assert env.render().shape == (480, 640, 3)
 
 
+def test_the_size_of_a_picture_may_be_a_list() -> None:
+    env = FlyEnv(image=[64, 48])
+    assert env.reset(seed=1)[0]["image"].shape == (48, 64, 3)
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
@@ -303,6 +307,7 @@ def test_pictures_show_the_flight_and_are_the_same_again() -> None:
         ({"episode": {"wind": 3}}, "episode.wind: unknown key; expected latitude"),
         ({"episode": {"seed": -1}}, "episode.seed: -1; expected a whole number, 0 or more"),
         ({"episode": {"speed": "fast"}}, "episode.speed: 'fast'; expected a number, or a distribution"),
+        ({"episode": {"speed": {"choice": ["slow"]}}}, "episode.speed.choice: ['slow']; expected a list of numbers"),
         ({"episode": {"failures": [{"kind": "stuck"}]}}, "episode.failures[0]: {'kind': 'stuck'}; expected"),
         ({"episode": {"failures": [{"name": "x", "kind": "bent"}]}}, "episode.failures[0].kind: 'bent'; expected one"),
         ({"episode": {"failures": [{"name": "x", "at": None}]}}, "episode.failures[0].at: None; expected a number"),
@@ -332,7 +337,7 @@ def test_a_wrong_reset_or_action_is_reported() -> None:
         env.reset(options={"speed": {"uniform": [9, 5]}})
     with pytest.raises(FlightModelError, match="airspeed 200"):
         env.reset(options={"speed": 200})
-    with pytest.raises(NotFlownError, match=r"fixed_wing has \(aileron1_wing2_left"):
+    with pytest.raises(GymError, match=r"episode\.failures\[0\]: .* fixed_wing has \(aileron1_wing2_left"):
         env.reset(options={"failures": [{"name": "aileron2_wing1_left", "kind": "stuck", "at": 9}]})
     env.reset(seed=1)
     with pytest.raises(GymError, match=r"action roll is 1\.5: expected -1\.\.1"):

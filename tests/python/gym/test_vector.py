@@ -131,6 +131,66 @@ def test_an_error_in_a_worker_is_raised_here(workers: int) -> None:
     assert envs.closed
 
 
+def interrupt(*_: Any) -> None:
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("during", ["vector._Worker.step", "vector._Inbox.receive"])
+def test_no_answer_of_an_interrupted_call_is_taken_for_that_of_the_next(
+    during: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    envs = FlyVectorEnv(2, workers=2, **GUSTY)
+    envs.reset(seed=1)
+    with monkeypatch.context() as patched:  # in this process; the worker runs already
+        patched.setattr(f"xplane_bridge.gym.{during}", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            envs.step(np.zeros((2, 1), np.float32))
+    assert not any(process.is_alive() for process in envs._processes)
+    with pytest.raises(GymError, match="the environments are closed; make new ones"):
+        envs.reset(seed=5)
+
+
+def test_environments_whose_closing_was_interrupted_are_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    envs = FlyVectorEnv(3, workers=3, **GUSTY)
+    closed = []
+    monkeypatch.setattr(envs._own, "close", lambda: closed.append(True))
+    with monkeypatch.context() as patched:
+        patched.setattr(envs._processes[0], "join", lambda timeout=None: interrupt() if timeout else None)
+        with pytest.raises(KeyboardInterrupt):
+            envs.close()
+    assert closed == [True]
+    for process in envs._processes:
+        process.join()
+        assert not process.is_alive()
+    with pytest.raises(GymError, match="closed"):
+        envs.reset(seed=5)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_pictures_are_those_of_each_alone(workers: int) -> None:
+    envs = FlyVectorEnv(3, workers=workers, render_mode="rgb_array", **GUSTY)
+    assert envs.render_mode == "rgb_array"
+    with pytest.raises(GymError, match="render: no episodes are being flown; call reset first"):
+        envs.render()
+    envs.reset(seed=7)
+    envs.step(np.ones((3, 1), np.float32))
+    pictures = envs.render()
+    assert len(pictures) == 3
+    for index, picture in enumerate(pictures):
+        alone = FlyEnv(render_mode="rgb_array", **GUSTY)
+        alone.reset(seed=7 + index)
+        alone.step(np.ones(1, np.float32))
+        assert np.array_equal(picture, alone.render())
+    *_, infos = envs.step(np.ones((3, 1), np.float32))
+    assert infos["sim_time"] == pytest.approx([5 / 60] * 3)
+    envs.close()
+
+
+def test_there_are_no_pictures_where_none_were_asked_for(vector: FlyVectorEnv) -> None:
+    vector.reset(seed=1)
+    assert vector.render() is None
+
+
 @pytest.mark.parametrize("workers", [1, 2])
 @pytest.mark.parametrize(
     ("options", "error", "text"),
@@ -138,7 +198,7 @@ def test_an_error_in_a_worker_is_raised_here(workers: int) -> None:
         ({"speed": 200}, FlightModelError, "airspeed 200"),
         ({"speeds": 70}, GymError, "episode.speeds: unknown key"),
         ({"speed": {"uniform": [9, 5]}}, CampaignError, "episode.speed.uniform"),
-        ({"failures": [{"name": "engine_9"}]}, Exception, "engine_9"),
+        ({"failures": [{"name": "engine_9"}]}, GymError, "engine_9"),
     ],
 )
 def test_wrong_options_are_refused_and_the_next_are_flown(workers: int, options: Any, error: Any, text: str) -> None:
