@@ -173,7 +173,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     verdicts += control_check.judge_control(plan.bag, **_LABELS) + overrides.verdicts
     for verdict in verdicts:
         print(verdict.line)
-    report = write_report([plan.bag], plan.output / "report.html")
+    report = write_report([plan.bag], plan.report)
     failed = [verdict.name for verdict in verdicts if not verdict.passed]
     print()
     if failed:

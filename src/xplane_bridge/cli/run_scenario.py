@@ -7,6 +7,7 @@ import json
 import math
 import shlex
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Dict, Optional, Sequence
 
@@ -182,15 +183,14 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs the program."""
     args = parser().parse_args(argv)
     scenario = scenario_of(args.scenario)
-    path = Path(args.scenario)
-    if path.is_file():
-        args.scenario = str(path.resolve())
+    args.scenario = str(scenario_file(args.scenario).absolute())
     plan = plan_of(scenario, args)
     plan.experiment = asked_for(scenario, args)
     plan.make_folders()
-    with interrupted_by_signals("run_scenario"), screen(plan.logs, args.headless or not args.camera):
+    shown = screen(plan.logs, args.headless) if plan.draws else nullcontext()
+    with interrupted_by_signals("run_scenario"), shown:
         fly(plan, say=lambda text: print(f"run_scenario: {text}", file=sys.stderr))
-    played = json.loads((plan.output / "played.json").read_text(encoding="utf-8"))
+    played = json.loads(plan.played.read_text(encoding="utf-8"))
     for entry in played["late"]:
         print(f"run_scenario: {late_text(entry)}", file=sys.stderr)
     if not played["finished"] and args.duration is None:
@@ -202,10 +202,10 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         scores = judge(scenario, read_flight(bags), played)
     report = {"scenario": scenario.name, "played": played, "criteria": [_plain(s) for s in scores]}
     text = json.dumps(report, indent=2, allow_nan=False) + "\n"
-    (plan.output / "scores.json").write_text(text, encoding="utf-8")
+    plan.scores.write_text(text, encoding="utf-8")
     missed = [s.name for s in scores if not s.passed]
     print(render(scores) if scores else f"{scenario.name} has no criteria")
     print(f"{scenario.name}: {len(scores) - len(missed)} of {len(scores)} criteria met; the recording is {plan.bag}")
-    page = [str(plan.bag), "-o", str(plan.output / "report.html")]
+    page = [str(plan.bag), "-o", str(plan.report)]
     print(f"for a report: scripts/flight_report {' '.join(map(shlex.quote, page))}")
     return 1 if missed else 0

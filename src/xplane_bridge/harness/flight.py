@@ -8,6 +8,7 @@ import xmlrpc.client
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any, Callable, Dict, List, Optional
 
 from xplane_bridge.harness.emulator import EmulatorProcess
@@ -22,6 +23,7 @@ _READY_TIMEOUT_S = 60.0
 _RECORDING = "flight.bag"
 _COMMANDS = tuple(f"{NAMESPACE}/control/{kind}" for kind in ("auto", "surfaces"))  #: where a controller commands
 _SILENCE_S = 10.0  # without a flight state for this long, a flight has failed
+_STANDING_S = 180.0  # likewise without simulator time; longer than tx_node's load_timeout, of 120 s
 
 
 @dataclass
@@ -54,7 +56,7 @@ class FlightPlan:
     @property
     def bag(self) -> Path:
         """The recording."""
-        return self.output / "flight.bag"
+        return self.output / _RECORDING
 
     @property
     def truth(self) -> Path:
@@ -62,22 +64,53 @@ class FlightPlan:
         return self.output / "truth.csv"
 
     @property
+    def played(self) -> Path:
+        """When what of a scenario happened, as its player writes it."""
+        return self.output / "played.json"
+
+    @property
+    def scores(self) -> Path:
+        """The criteria of a scenario, measured."""
+        return self.output / "scores.json"
+
+    @property
+    def report(self) -> Path:
+        """The page that draws the recording."""
+        return self.output / "report.html"
+
+    @property
     def logs(self) -> Path:
         """Folder of the logs of all programs."""
         return self.output / "logs"
 
+    @property
+    def draws(self) -> bool:
+        """Whether the emulator shows a window."""
+        return any(option.partition("=")[0] == "--window" for option in self.emulator_options)
+
     def make_folders(self) -> None:
-        """Makes what is to be written to.
+        """Makes the folders that are to be written to.
 
         Raises:
-            HarnessError: It cannot be made.
+            HarnessError: They cannot be made, or nothing can be written into one that is there.
         """
+        folder = self.output
         try:
             self.logs.mkdir(parents=True, exist_ok=True)
+            for folder in (self.output, self.logs):
+                with TemporaryFile(dir=folder):
+                    pass
         except OSError as error:
             raise HarnessError(
-                f"{self.output} cannot be written to: {error.strerror}; --output takes a folder or a new name"
+                f"{folder} cannot be written to: {error.strerror}; --output takes a folder of yours or a new name"
             ) from None
+
+    def remove_old(self) -> None:
+        """Removes all that an earlier flight has left in these folders, but for its logs."""
+        unfinished = self.logs.glob(f"ros/{_RECORDING}*")  # of a flight that was broken off
+        for old in (self.bag, self.truth, self.played, self.scores, self.report, *unfinished):
+            if old.exists():
+                old.unlink()
 
 
 Observer = Callable[[RunningFlight], None]
@@ -102,12 +135,10 @@ def fly(
         afterwards: called when the bridge has ended while the emulator still runs.
 
     Raises:
-        HarnessError: A program failed, or flight states stopped coming.
+        HarnessError: A program failed, or flight states stopped coming, or the simulator's time stood still.
     """
     plan.make_folders()
-    for old in (plan.bag, plan.truth):
-        if old.exists():
-            old.unlink()
+    plan.remove_old()
     with ExitStack() as stack:
         say("starting the emulator")
         options = ["--aircraft", plan.aircraft, "--truth", str(plan.truth.resolve()), *plan.emulator_options]
@@ -202,8 +233,8 @@ def _wait_for_controller(flight: RunningFlight, controller: ManagedProcess) -> N
 
 
 def _record(plan: FlightPlan, flight: RunningFlight, observer: Observer) -> None:
-    last_new = time.monotonic()
-    seen = 0
+    last_new = last_moved = time.monotonic()
+    seen, counted = 0, 0.0
     flight.count_time()
     while flight.elapsed < plan.duration:
         flight.bridge.check_running()
@@ -216,6 +247,14 @@ def _record(plan: FlightPlan, flight: RunningFlight, observer: Observer) -> None
         elif now - last_new > plan.silence_allowed:
             raise HarnessError(
                 flight.emulator.describe(f"or the bridge is silent: no flight state for {now - last_new:.0f} s")
+            )
+        if flight.elapsed > counted:
+            counted, last_moved = flight.elapsed, now
+        elif now - last_moved > _STANDING_S:  # states repeat in a pause
+            raise HarnessError(
+                f"X-Plane's time has stood still for {now - last_moved:.0f} s, {counted:.1f} s into the flight: it is "
+                f"paused, or its sim_speed is 0; expected {_STANDING_S:g} s at most. No event at a later time comes "
+                "in a pause: leave out what pauses, or let another program end it"
             )
         observer(flight)
         time.sleep(0.1)

@@ -17,6 +17,7 @@ from xplane_bridge.resources import clone_dir
 
 _MASTER_TIMEOUT_S = 30.0
 _CALLER = "/xplane_bridge_harness"
+_NAMESPACE = "ROS_NAMESPACE"
 
 
 def ros_environment(base: Optional[Mapping[str, str]] = None) -> dict[str, str]:
@@ -26,12 +27,14 @@ def ros_environment(base: Optional[Mapping[str, str]] = None) -> dict[str, str]:
         base: the environment to start from; this process's own when omitted.
 
     Returns:
-        `base` when this package is in it (setup.bash has been sourced), else what scripts/setup has made in the clone.
+        `base` when this package is in it (setup.bash has been sourced), else what scripts/setup has made in the clone;
+        without ROS_NAMESPACE, below which nodes would be looked for in vain.
 
     Raises:
         HarnessError: There is neither.
     """
     env = dict(os.environ if base is None else base)
+    env.pop(_NAMESPACE, None)
     if shutil.which("roslaunch", path=env.get("PATH")) and _knows_package(env):
         return env
     clone = clone_dir()
@@ -178,6 +181,7 @@ class RosMaster(ManagedProcess):
     def use_here(self) -> None:
         """Makes this very process use the master: its environment, and rospy's once that is imported."""
         os.environ.update(self.env)
+        os.environ.pop(_NAMESPACE, None)
         for folder in reversed(self.env.get("PYTHONPATH", "").split(os.pathsep)):
             if folder and folder not in sys.path:
                 sys.path.insert(0, folder)

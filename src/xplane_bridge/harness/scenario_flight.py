@@ -41,7 +41,7 @@ def scenario_plan(
     Args:
         scenario: what to fly.
         source: of the scenario: stem of a file in config/scenarios, or a path.
-        output: folder of everything that is written; the player writes `played.json` into it.
+        output: folder of everything that is written, also by the player.
         duration: [s] after which it ends at the latest.
         aircraft: what to fly; the scenario's first when omitted.
         joystick: device through which to fly; commands when omitted.
@@ -67,9 +67,9 @@ def scenario_plan(
         options.append("--aerodrome=" + ",".join(f"{value:.9g}" for value in place))
     options += emulator_options
     arguments = dict(launch_args or {})
-    player = [str(program("scenario_player")), source, "--log", str((output / "played.json").resolve())]
-    ready = {PLAYER: _PLAYS if lockstep is None else _IS_READY}
-    programs: Dict[str, List[str]] = {}
+    plan = FlightPlan(output, duration, chosen, transport, options, arguments, player=PLAYER, lockstep=lockstep)
+    player = [str(program("scenario_player")), source, "--log", str(plan.played.resolve())]
+    plan.ready[PLAYER] = _PLAYS if lockstep is None else _IS_READY
     if joystick:
         # Only to see that there is one: its path may hold a space, which roslaunch cannot take.
         config_file("joysticks", f"{joystick}.yaml")
@@ -87,22 +87,11 @@ def scenario_plan(
         else:
             lockstep.participants.append("fly_controller")
     if controller:
-        programs[CONTROLLER] = list(controller)
+        plan.controller = CONTROLLER
+        plan.programs[CONTROLLER] = list(controller)
         if controller_ready:
-            ready[CONTROLLER] = controller_ready
+            plan.ready[CONTROLLER] = controller_ready
     if lockstep is not None:
         lockstep.participants.append(PLAYER)
-    programs[PLAYER] = player  # last: it must not begin before the others can follow
-    return FlightPlan(
-        output,
-        duration,
-        chosen,
-        transport,
-        options,
-        arguments,
-        programs=programs,
-        player=PLAYER,
-        controller=CONTROLLER if controller else "",
-        ready=ready,
-        lockstep=lockstep,
-    )
+    plan.programs[PLAYER] = player  # last: it must not begin before the others can follow
+    return plan

@@ -81,6 +81,39 @@ def test_scores_are_strict_json(monkeypatch, tmp_path):
     assert {each["name"]: each["value"] for each in criteria} == {"1.5": 1.5, "inf": "never", "nan": None}
 
 
+@pytest.mark.parametrize(
+    ("options", "screens"),
+    [
+        ([], []),
+        (["--headless"], []),
+        (["--camera"], [False]),
+        (["--camera", "--headless"], [True]),
+        (["--emulator=--fps 30 --window=320x240"], [False]),
+    ],
+)
+def test_a_screen_is_had_only_where_something_is_drawn(monkeypatch, tmp_path, options, screens):
+    had = []
+    stand_in_for_a_flight(monkeypatch)
+    monkeypatch.setattr(run_scenario, "screen", lambda _, headless: had.append(headless) or nullcontext())
+    assert run_scenario.main(["engine_failure", "--output", str(tmp_path), *options]) == 0
+    assert had == screens
+
+
+def test_a_file_that_is_named_like_a_shipped_scenario_is_not_meant(monkeypatch, tmp_path):
+    stand_in_for_a_flight(monkeypatch)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "engine_failure").touch()
+    assert run_scenario.main(["engine_failure", "--output", "out"]) == 0
+
+
+def test_a_link_may_name_a_scenario_without_ending(monkeypatch, tmp_path):
+    stand_in_for_a_flight(monkeypatch)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.txt").write_text("name: mine\nevents: [{at: 1, end: true}]\n", encoding="utf-8")
+    (tmp_path / "mine.yaml").symlink_to("mine.txt")
+    assert run_scenario.main(["mine.yaml", "--output", "out"]) == 0
+
+
 def level(_state):
     """A controller that is a function."""
     return {"roll": 0.0}

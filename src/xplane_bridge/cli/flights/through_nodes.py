@@ -62,10 +62,7 @@ def fly(plan: FlightPlan, duration: float, output: Path) -> harness_flight.Fligh
     Raises:
         HarnessError: A program failed.
     """
-    output.mkdir(parents=True, exist_ok=True)
     scenario_file, conditions_file = output / "scenario.yaml", output / "conditions.json"
-    scenario_file.write_text(yaml.safe_dump(plan.scenario, sort_keys=False), encoding="utf-8")
-    conditions_file.write_text(json.dumps(dataclasses.asdict(conditions_of(plan))), encoding="utf-8")
     lockstep = Lockstep(fps=plan.frame_rate)
     controller: List[str] = []
     if plan.controller:
@@ -85,6 +82,8 @@ def fly(plan: FlightPlan, duration: float, output: Path) -> harness_flight.Fligh
     flown.emulator_command = [sys.executable, "-m", _EMULATOR, str(conditions_file.resolve())]
     flown.experiment = {"program": "run_campaign", "flight": plan.flight, "seed": plan.seed}
     flown.make_folders()
+    scenario_file.write_text(yaml.safe_dump(plan.scenario, sort_keys=False), encoding="utf-8")
+    conditions_file.write_text(json.dumps(dataclasses.asdict(conditions_of(plan))), encoding="utf-8")
     with interrupted_by_signals("run_campaign"):
         harness_flight.fly(flown, say=lambda text: print(f"run_campaign: {text}", file=sys.stderr))
     return flown
@@ -138,11 +137,11 @@ def compare(plan: FlightPlan, result: FlightResult, seen: Sequence[Any], output:
         ScenarioError: No state was recorded.
     """
     flown = fly(plan, result.duration, output)
-    played = json.loads((output / "played.json").read_text(encoding="utf-8"))
+    played = json.loads(flown.played.read_text(encoding="utf-8"))
     with Bags(flown.bag) as bags:
         recorded = read_flight(bags)
         scores = judge(parse_scenario(plan.scenario), recorded, played, len(seen))
-    page = write_report([flown.bag], output / "report.html")
+    page = write_report([flown.bag], flown.report)
     print(f"through the nodes: {flown.bag}, drawn in {page}")
     print(render(result, scores))
     states = recorded.tables["state"]
