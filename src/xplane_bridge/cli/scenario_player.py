@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import threading
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Dict, Optional, Sequence
+from typing import Any, Dict, Iterator, Optional, Sequence
 
 from xplane_bridge import lockstep
 from xplane_bridge.cli.bridge.loaded_aircraft import LoadedAircraft
 from xplane_bridge.cli.bridge.waiting import PATIENCE_S, about_joy, surroundings, wait_for_state
-from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
+from xplane_bridge.cli.entry import guarded, ros_arguments, start_node, writing
 from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import Scenario, ScenarioError, load_scenario
 from xplane_bridge.scenario.lockstep_player import LockstepPlayer
@@ -117,6 +119,28 @@ def _watch_joy(namespace: str, node: str) -> threading.Timer:
     return watch
 
 
+def _write(log: Path, player: RosPlayer) -> None:
+    text = json.dumps(player.report(), indent=2) + "\n"
+    with writing(ScenarioError, f"--log {log}", "expected a file that can be written"):
+        log.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def _logged(player: RosPlayer, node: str, log: Optional[Path]) -> Iterator[None]:
+    """Writes at the end when what happened. An error of the flight comes before one of the file."""
+    try:
+        yield
+    except BaseException:
+        if log is not None:
+            try:
+                _write(log, player)
+            except ScenarioError as error:
+                print(f"{node}: {error}", file=sys.stderr, flush=True)
+        raise
+    if log is not None:
+        _write(log, player)
+
+
 def play(
     args: argparse.Namespace, argv: Optional[Sequence[str]], node: str, joystick: bool, log: Optional[Path] = None
 ) -> int:
@@ -126,6 +150,8 @@ def play(
     stick = stick_of(args.joy_config, args.stick_mode, None) if joystick else None
     if not joystick:
         refuse_buttons(scenario, "--joystick")
+    if log is not None and not log.parent.is_dir():
+        raise ScenarioError(f"--log {log}: there is no folder {log.parent}; make it, or give another file")
     namespace = args.namespace.rstrip("/")
     rospy = start_node(node, argv=None if argv is None else list(argv), **lockstep.node_options(namespace))
     if joystick:
@@ -133,7 +159,7 @@ def play(
         stick = stick_of(args.joy_config, args.stick_mode, mapped)
     remedy = f"load one that it is for, or play another scenario (aircraft in {args.scenario} says which it is for)"
     aircraft = LoadedAircraft(namespace, node, scenario.aircraft, remedy, lambda text: player.fail(text))
-    kwargs: Dict[str, Any] = {"stick": stick, "log": log, "say": lambda text: print(text, flush=True)}
+    kwargs: Dict[str, Any] = {"stick": stick, "say": lambda text: print(text, flush=True)}
     if lockstep.is_on(namespace):
         player: RosPlayer = LockstepPlayer(scenario, namespace, check=aircraft.check, **kwargs)
     else:
@@ -144,7 +170,8 @@ def play(
     if joystick:
         watch.start()
     try:
-        player.run()
+        with _logged(player, node, log):
+            player.run()
     finally:
         watch.cancel()
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import deque
 from typing import Any, Callable, Deque, Optional, Tuple
@@ -12,6 +13,7 @@ from xplane_bridge.scenario.player import Action, Commands
 from xplane_bridge.scenario.ros_player import MODE_NAMES, MODE_WAIT_S, RosPlayer, mode_has_not_come
 from xplane_bridge.scenario.schema import ScenarioError
 from xplane_bridge.scenario.stall_warnings import RATE, age_ns
+from xplane_bridge.scenario.tx_services import ChangeUnderWayError
 
 _POLL_S = 0.2
 
@@ -26,6 +28,7 @@ class LockstepPlayer(RosPlayer):
     """
 
     _link_wait_s = 0.0  # no frame comes while this node has not answered one
+    _change_wait_s = math.inf  # tx_node's own time-outs end a change, by simulated time
 
     def __init__(self, *args: Any, check: Callable[[], None], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -50,6 +53,7 @@ class LockstepPlayer(RosPlayer):
         from xplane_bridge.msg import WarningState
         from xplane_bridge.srv import LockstepStep
 
+        self._listen_to_events()
         service = self._namespace + "/lockstep/"
         self._out = publisher
         self._hold = rospy.ServiceProxy(service + "hold", Trigger)
@@ -65,6 +69,12 @@ class LockstepPlayer(RosPlayer):
         if self._error is None and self._ending.is_set():
             # No frames more; it is answered when the last answer of this node has come.
             rospy.ServiceProxy(service + "step", LockstepStep)(frames=0)
+            if self._outcomes.pending():
+                self._say("warning: what was asked for last was still under way at the end; see `events`")
+
+    def _has_ended(self) -> bool:
+        """A report that is still to come is not awaited: in which frame it is heard depends on the computer."""
+        return self._finished.is_set() and self._error is None
 
     def _find_warnings_age(self) -> bool:
         """Follows the rate at which rx_node asks for warnings; returns False where it asks for none."""
@@ -86,10 +96,10 @@ class LockstepPlayer(RosPlayer):
         try:
             return self._play_frame(state)
         except ScenarioError as error:
-            self.fail(f"{self._player.scenario.name}, at {self._clock.now:.1f} s: {error}")
+            self._fail_at(self._clock.now, str(error))
             raise
         except Exception as error:  # rospy would log it, and the frame never be answered
-            self.fail(f"{self._player.scenario.name}, at {self._clock.now:.1f} s: {error!r}")
+            self._fail_at(self._clock.now, repr(error))
             raise
 
     def _play_frame(self, state: Any) -> Any:
@@ -128,7 +138,11 @@ class LockstepPlayer(RosPlayer):
         self._due.append(action)
 
     def _act_on(self) -> None:
-        """What has become due, in its order; a mode that a button asks for is awaited before the next."""
+        """What has become due, in its order.
+
+        A mode that a button asks for is awaited before the next. A disturbance for which a change has to end is asked
+        for in each frame: tx_node's answer belongs to the frame, whereas an event comes whenever it comes.
+        """
         if self._awaited is not None:
             mode, latest = self._awaited
             if self._mode == mode:
@@ -136,7 +150,11 @@ class LockstepPlayer(RosPlayer):
             elif self._clock.now > latest:
                 raise ScenarioError(mode_has_not_come(MODE_NAMES[mode]))
         while self._due and self._awaited is None:
-            self._act(self._due.popleft())
+            try:
+                self._act(self._due[0])
+            except ChangeUnderWayError:
+                return
+            self._due.popleft()
 
     def _take_taps(self, commands: Commands) -> None:
         """Leaves them in their step: each is answered by a message."""
@@ -146,6 +164,4 @@ class LockstepPlayer(RosPlayer):
             self._tap(self._stick, MODE_NAMES[wanted])
             self._awaited = (wanted, self._clock.now + MODE_WAIT_S)
             return
-        from xplane_bridge.srv import SetMode
-
-        self._call("set_mode", SetMode, f"mode {MODE_NAMES[wanted]}", mode=wanted)
+        self._services.set_mode(wanted, MODE_NAMES[wanted])

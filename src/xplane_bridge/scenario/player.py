@@ -233,7 +233,9 @@ class Player:
         self._held = {axis: value for axis, value in held.items() if value is not None and math.isfinite(value)}
         for axis, (low, high) in STICK_AXES.items():
             value = held[axis]
-            if value is None and axis in self._axes:
+            if value is not None:  # it does not go back to an earlier movement when it is let go
+                self._axes.pop(axis, None)
+            elif axis in self._axes:
                 value = self._axes[axis].at(now)
             if axis == "throttle":
                 if value is not None and math.isfinite(value):

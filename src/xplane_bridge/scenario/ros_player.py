@@ -6,34 +6,36 @@ Stick and handles become commands or a joystick; modes, failures and excitations
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import queue
 import threading
 import time
-from pathlib import Path
 from typing import Any, Callable, Dict, List, Optional, Tuple
 
-from xplane_bridge.constants import FlightMode, ResultCode, words
+from xplane_bridge.constants import FlightMode, words
 from xplane_bridge.errors import is_number
 from xplane_bridge.scenario.command_fields import fill_fields
 from xplane_bridge.scenario.late_actions import late_entry, late_text
 from xplane_bridge.scenario.player import Action, Commands, FlightSample, Player
-from xplane_bridge.scenario.resets import reset_request
 from xplane_bridge.scenario.schema import HANDLE_FIELDS, Scenario, ScenarioError
 from xplane_bridge.scenario.stall_warnings import RATE, awaits_stall
 from xplane_bridge.scenario.taps import Taps
 from xplane_bridge.scenario.traffic import ScenarioTraffic
+from xplane_bridge.scenario.tx_services import (
+    AGAIN_S,
+    CHANGE_WAIT_S,
+    SERVICE_WAIT_S,
+    ChangeUnderWayError,
+    Outcomes,
+    TxServices,
+)
 from xplane_bridge.scenario.virtual_stick import VirtualStick
-from xplane_bridge.scenario.world import disturbance_request, time_request, weather_request, wind_request
 
 #: Rate of the stick's messages [1/s]; they go on between flight states, as a real stick's do.
 STICK_RATE = 50.0
 _BLIND_S = 1.0  # without a flight state, after which the stick is let go: tx_node's failsafe knows better
-_SERVICE_WAIT_S = 15.0  # for a service to be there
-_AGAIN_S = 0.1  # after a refusal for want of a link
 MODE_WAIT_S = 15.0  #: for a mode to be shown
-_NOT_BROKEN = "is not broken"  # in the answer of clear_failures
+_PAUSE_S = 5.0  # of a pause, of wall time, after which it is worth a warning
 MODE_NAMES = words(FlightMode)
 
 
@@ -85,24 +87,24 @@ class RosPlayer:
         scenario: What to play.
         namespace: Of the bridge, e.g. "/xplane".
         stick: The device to play as, on `joy`; None: commands on `control/manual`.
-        log: Where to write, at the end, when what happened (JSON); None: nowhere.
         say: Called with a line on each event.
     """
 
     _link_wait_s = 15.0  # for X-Plane's link, where tx_node has none
+    _change_wait_s = CHANGE_WAIT_S
 
     def __init__(
         self,
         scenario: Scenario,
         namespace: str,
         stick: Optional[VirtualStick] = None,
-        log: Optional[Path] = None,
         say: Callable[[str], None] = print,
     ) -> None:
         self._player = Player(scenario)
         self._namespace = namespace.rstrip("/")
         self._stick = stick
-        self._log = log
+        if stick is not None:
+            stick.provide_buttons(scenario)
         self._say = say
         self._clock = ScenarioClock()
         self._begin: Optional[Dict[str, float]] = None
@@ -110,6 +112,8 @@ class RosPlayer:
         self._lock = threading.Lock()
         self._commands: Optional[Commands] = None
         self._heard = -math.inf  # when the last flight state came
+        self._paused: Optional[float] = None  # when the pause that goes on began
+        self._said_paused = False
         self._mode: Optional[int] = None
         self._sees_stall = awaits_stall(scenario)
         self._stall = False
@@ -121,6 +125,8 @@ class RosPlayer:
         self._of_pilot: queue.Queue[Optional[Action]] = queue.Queue()
         self._of_others: queue.Queue[Optional[Action]] = queue.Queue()
         self._served = threading.Lock()  # tx_node serves one call after the other
+        self._outcomes = Outcomes(self._fail_at, self._change_wait_s)
+        self._services = TxServices(self._namespace, self._link_wait_s, say, self._outcomes)
         self._commanded = threading.Event()
         self._late: List[Dict[str, Any]] = []
         self._finished = threading.Event()
@@ -132,14 +138,15 @@ class RosPlayer:
         Raises:
             ScenarioError: Something the scenario asked for was refused or did not come about.
         """
-        try:
-            self._play(self._advertise())
-        finally:
-            self._write_log()
+        self._play(self._advertise())
         if self._error is not None:
             raise ScenarioError(self._error)
-        if not self._finished.is_set():
+        if not self._has_ended():
             raise ScenarioError(f"{self._player.scenario.name}: ended by ROS after {self._clock.now:.1f} s")
+
+    def _has_ended(self) -> bool:
+        """Without an error, and with all changes reported that were asked for."""
+        return self._finished.is_set() and not self._outcomes.pending() and self._error is None
 
     def _advertise(self) -> Any:
         """Gives the publisher of stick or commands."""
@@ -171,6 +178,7 @@ class RosPlayer:
 
         from xplane_bridge.msg import ControlMode, FlightState, WarningState
 
+        self._listen_to_events()
         topic = self._namespace + "/"
         rospy.Subscriber(topic + "control/mode", ControlMode, self._on_mode)
         rospy.Subscriber(topic + "mission/warnings", WarningState, self._on_warnings)
@@ -186,12 +194,19 @@ class RosPlayer:
             actions.put(None)
 
         def acting() -> bool:
-            return any(worker.is_alive() for worker in workers)
+            return any(worker.is_alive() for worker in workers) or (self._error is None and self._outcomes.pending())
 
         # What the last events asked for is still seen through, while the stick is held.
         while not rospy.is_shutdown() and (acting() or (self._taps.pending and self._to_send() is not None)):
             self._publish(publisher)
             time.sleep(1.0 / STICK_RATE)
+
+    def _listen_to_events(self) -> None:
+        import rospy
+
+        from xplane_bridge.msg import EventList
+
+        rospy.Subscriber(self._namespace + "/events", EventList, self._outcomes.take)
 
     def _warnings_rate(self) -> float:
         """At which rx_node asks for warnings [1/s]; fails, and returns 0, where it asks for none."""
@@ -219,11 +234,29 @@ class RosPlayer:
         self._heard = time.monotonic()
         if self._finished.is_set():
             return
+        self._watch_pause(state)
         try:
             self._play_on(state)
         except Exception as error:  # rospy would log it, and the stick stay where it is
-            self.fail(f"{self._player.scenario.name}, at {self._clock.now:.1f} s: {error!r}")
+            self._fail_at(self._clock.now, repr(error))
             raise
+
+    def _watch_pause(self, state: Any) -> None:
+        """Says once of a pause that lasts, perhaps the scenario's own, that events wait for its end."""
+        if not state.paused or self._outcomes.pending():  # reset_flight pauses X-Plane, and lets it go on
+            self._paused = None
+        elif self._paused is None:
+            self._paused = self._heard
+        elif self._heard - self._paused > _PAUSE_S and not self._said_paused:
+            self._said_paused = True
+            self._say(
+                f"warning: X-Plane is paused, and scenario time stands at {self._clock.now:.1f} s: let it go on, as "
+                f"with rosservice call {self._namespace}/tx_node/pause false"
+            )
+
+    def _fail_at(self, at: float, error: str) -> None:
+        """Ends it with an error of what happened at this scenario time [s]."""
+        self.fail(f"{self._player.scenario.name}, at {at:.1f} s: {error}")
 
     def fail(self, error: str) -> None:
         """Ends it with an error; the first one counts."""
@@ -310,39 +343,39 @@ class RosPlayer:
                 return
             try:
                 if action.kind == "excitation":  # it is added to a command
-                    self._commanded.wait(_SERVICE_WAIT_S)
-                self._act(action)
+                    self._commanded.wait(SERVICE_WAIT_S)
+                self._act_in_time(action)
             except ScenarioError as error:
-                self.fail(f"{self._player.scenario.name}, at {action.time:.1f} s: {error}")
+                self._fail_at(action.time, str(error))
                 return
             except BaseException as error:  # a thread of its own must not die unheard
                 self.fail(f"{action.kind}: {error!r}")
                 raise
 
+    def _act_in_time(self, action: Action) -> None:
+        """Carries it out, once tx_node is not at another change any more."""
+        deadline = time.monotonic() + self._change_wait_s
+        while True:
+            try:
+                return self._act(action)
+            except ChangeUnderWayError:
+                if self._error is not None or time.monotonic() >= deadline:
+                    raise
+            time.sleep(AGAIN_S)
+
     def _act(self, action: Action) -> None:
         if action.kind == "mode":
             self._request_mode(action.value)
-            self._note_time(action)
+            self._note_time(action, self._clock.now)
             return
-        calls: Dict[str, Callable[[Any], None]] = {
-            "failure": self._failure,
-            "clear_failures": self._clear_failures,
-            "excitation": self._excitation,
-            "reset": self._reset,
-            "wind": self._wind,
-            "disturb": self._disturb,
-            "weather": self._weather,
-            "time": self._time,
-            "dataref": self._datarefs,
-            "command": self._command,
-        }
         with self._served:
-            self._note_time(action)
-            calls[action.kind](action.value)
+            begun = self._clock.now
+            self._services.carry_out(action)
+        self._note_time(action, begun)
 
-    def _note_time(self, action: Action) -> None:
-        """Keeps that an action comes late, if it does."""
-        entry = late_entry(action, self._clock.now)
+    def _note_time(self, action: Action, begun: float) -> None:
+        """Keeps that an action, begun at this scenario time [s], comes late, if it does."""
+        entry = late_entry(action, begun)
         if entry is not None:
             self._late.append(entry)
             self._say(late_text(entry))
@@ -377,120 +410,16 @@ class RosPlayer:
         if button is not None:
             self._taps.add(button)
 
-    def _call(self, service: str, service_type: Any, what: str, **fields: Any) -> None:
-        """Calls tx_node. Where it has no link to X-Plane, as when a frame is late, it does nothing: then again."""
-        import rospy
-
-        name = f"{self._namespace}/tx_node/{service}"
-        deadline = time.monotonic() + self._link_wait_s
-        said = False
-        while True:
-            try:
-                rospy.wait_for_service(name, _SERVICE_WAIT_S)
-                response = rospy.ServiceProxy(name, service_type)(**fields)
-            except (rospy.ROSException, rospy.ServiceException) as error:
-                raise ScenarioError(f"{what}: {name} cannot be called: {error}") from None
-            if response.success:
-                return
-            unlinked = response.result.code == ResultCode.NO_LINK
-            # What is not broken needs no repair, and without a link it is repaired as soon as that is back.
-            done = service == "clear_failures" and (unlinked or _NOT_BROKEN in response.result.message)
-            if (unlinked or done) and not said:
-                said = True
-                self._say(f"{what}: {response.result.message}")
-            if done:
-                return
-            if not unlinked or time.monotonic() >= deadline:
-                raise ScenarioError(f"{what}: {response.result.message}")
-            time.sleep(_AGAIN_S)
-
-    def _failure(self, value: Dict[str, Any]) -> None:
-        from xplane_bridge.srv import ClearFailures, SetFailure
-
-        name = value["name"]
-        if value["clear"]:
-            self._call("clear_failures", ClearFailures, f"repairing {name}", names=[name])
-            return
-        number = value["value"]
-        self._call(
-            "set_failure",
-            SetFailure,
-            f"failure of {name}",
-            name=name,
-            kind=value["kind"],
-            has_value=number is not None,
-            value=0.0 if number is None else number,
-        )
-
-    def _clear_failures(self, _: Any) -> None:
-        from xplane_bridge.srv import ClearFailures
-
-        self._call("clear_failures", ClearFailures, "repairing everything", names=[], include_simulator=False)
-
-    def _excitation(self, value: Dict[str, Any]) -> None:
-        from xplane_bridge.srv import InjectExcitation
-
-        self._call(
-            "inject_excitation",
-            InjectExcitation,
-            f"excitation of {value['target']}",
-            kind=value["kind"],
-            target=value["target"],
-            amplitude=value["amplitude"],
-            duration=value["duration"],
-            frequency_min=value["frequency"],
-            frequency_max=value["frequency_end"],
-            seed=value["seed"],
-        )
-
-    def _reset(self, value: Dict[str, Any]) -> None:
-        from xplane_bridge.srv import ResetFlight
-
-        self._call("reset_flight", ResetFlight, "reset", **reset_request(value))
-
-    def _wind(self, value: Dict[str, float]) -> None:
-        from xplane_bridge.srv import SetWind
-
-        self._call("set_wind", SetWind, "wind", **wind_request(value))
-
-    def _disturb(self, value: Dict[str, Any]) -> None:
-        from xplane_bridge.srv import SetDisturbance
-
-        self._call("disturb", SetDisturbance, f"disturbance {value['kind']}", **disturbance_request(value))
-
-    def _weather(self, value: Dict[str, Any]) -> None:
-        from xplane_bridge.srv import SetWeather, SetWeatherRequest
-
-        self._call("set_weather", SetWeather, "weather", **weather_request(value, SetWeatherRequest))
-
-    def _time(self, value: Dict[str, float]) -> None:
-        from xplane_bridge.srv import SetTime, SetTimeRequest
-
-        self._call("set_time", SetTime, "time", **time_request(value, SetTimeRequest))
-
-    def _datarefs(self, values: Dict[str, float]) -> None:
-        from xplane_bridge.srv import SetDataref
-
-        for path, number in values.items():
-            self._call("set_dataref", SetDataref, f"dataref {path}", name=path, values=[number])
-
-    def _command(self, name: str) -> None:
-        from xplane_bridge.srv import RunCommand
-
-        self._call("run_command", RunCommand, f"command {name}", name=name)
-
     # --- afterwards ---------------------------------------------------------------------------------------------------
 
-    def _write_log(self) -> None:
-        if self._log is None:
-            return
-        report: Dict[str, Any] = {
+    def report(self) -> Dict[str, Any]:
+        """When what happened, for a file: of numbers and texts."""
+        return {
             "scenario": self._player.scenario.name,
             "begin": self._begin,
             "labels": self._labels,
             "late": self._late,
             "duration": self._clock.now,
-            "finished": self._finished.is_set() and self._error is None,
+            "finished": self._has_ended(),
             "error": self._error,
         }
-        self._log.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")

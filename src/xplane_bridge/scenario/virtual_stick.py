@@ -16,7 +16,7 @@ from xplane_bridge.errors import text_problem, yaml_problem
 from xplane_bridge.scenario.player import Commands
 from xplane_bridge.scenario.schema import Scenario, ScenarioError
 
-#: A device whose file names higher axes has more of them.
+#: A device whose file names higher axes or buttons has more of them.
 AXIS_COUNT, BUTTON_COUNT = 8, 12
 _GRID = np.linspace(0.0, 1.0, 2001)
 #: An axis that has been moved, and back to its middle; too small to be seen in a command.
@@ -54,6 +54,7 @@ class VirtualStick:
             if axis not in self._axes:
                 raise ScenarioError(f"{self.name}: direct.{axis} is missing; a virtual stick needs it")
         self._axis_count = _axis_count(device, mode)
+        self._button_count = _button_count(device)
         #: By target and whether the handle is far from 0 while they are pressed.
         self._buttons = {
             (str(entry.get("target", key)), float(entry.get("value", 1.0)) >= 0.5): int(entry["button"])
@@ -62,6 +63,14 @@ class VirtualStick:
         }
         self._mode_buttons = {key: int(value) for key, value in device.get("mode", {}).items() if int(value) >= 0}
         self._throttle_axis_known = "throttle" in self._axes
+
+    def provide_buttons(self, scenario: Scenario) -> None:
+        """Has the buttons that a scenario presses, whether or not its file names them."""
+        for event in scenario.events:
+            for kind, value in event.actions:
+                if kind == "buttons":
+                    numbers = [number for given in value.values() for number in given]
+                    self._button_count = max(self._button_count, max(numbers) + 1)
 
     def mode_button(self, mode: str, present: str) -> Optional[int]:
         """The button that asks for a mode; None when nothing has to be pressed.
@@ -81,7 +90,7 @@ class VirtualStick:
         Raises:
             ScenarioError: The scenario moves something that this device cannot move, or not so far.
         """
-        axes, buttons = [0.0] * self._axis_count, [0] * BUTTON_COUNT
+        axes, buttons = [0.0] * self._axis_count, [0] * self._button_count
         moved = dict(commands.stick)
         if commands.throttle is not None:
             if not self._throttle_axis_known:
@@ -96,8 +105,6 @@ class VirtualStick:
             if button is not None:
                 pressed.add(button)
         for button in pressed:
-            if not 0 <= button < BUTTON_COUNT:
-                raise ScenarioError(f"{self.name}: button {button}; expected 0 to {BUTTON_COUNT - 1}")
             buttons[button] = 1
         return axes, buttons
 
@@ -164,7 +171,8 @@ def load_stick(file: Path, stick_mode: Optional[int] = None) -> VirtualStick:
         raise ScenarioError(f"{file}: {yaml_problem(error)}") from None
     if not isinstance(device, dict):
         raise ScenarioError(f"{file}: expected a mapping with device, direct, ...")
-    return VirtualStick(device, stick_mode)
+    # A section whose lines are all comments is none.
+    return VirtualStick({key: value for key, value in device.items() if value is not None}, stick_mode)
 
 
 def _axis_index(entry: Dict[str, Any], mode: int) -> int:
@@ -176,6 +184,13 @@ def _axis_index(entry: Dict[str, Any], mode: int) -> int:
 def _axis_count(device: Dict[str, Any], mode: int) -> int:
     entries = [entry for section in ("direct", "integrated", "surfaces") for entry in device.get(section, {}).values()]
     return max(AXIS_COUNT, *(_axis_index(entry, mode) + 1 for entry in entries))
+
+
+def _button_count(device: Dict[str, Any]) -> int:
+    sections = ("integrated", "buttons", "surfaces", "functions")
+    entries = [entry for section in sections for entry in device.get(section, {}).values()]
+    named = [number for entry in entries for key, number in entry.items() if key.endswith("button")]
+    return max(BUTTON_COUNT, *(int(number) + 1 for number in (*named, *device.get("mode", {}).values(), -1)))
 
 
 def _reach(entry: Dict[str, Any]) -> Tuple[float, float]:

@@ -52,7 +52,7 @@ def run(tmp_path, text, *options, out=None):
     output = str(out or tmp_path / "out")
     command = [sys.executable, str(program("run_scenario")), str(scenario), "--output", output, *options]
     # In a process of its own: one process is one ROS node.
-    return subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 
 @pytest.mark.parametrize("options", [(), ("--joystick", "logitech_extreme_3d_pro")], ids=["commands", "joystick"])
@@ -129,6 +129,64 @@ def test_a_scenario_starts_at_an_airport(tmp_path):
     assert "the flight begins at runway 0, end 1 of XEMU" in [event.text for event in reported if event.success]
     assert states["on_ground"][-1]
     assert states["heading_true_deg"][-1] == pytest.approx(270.0, abs=1.0)
+
+
+#: tx_node waits for a place for 120 s, which pass faster in lock-step.
+@pytest.mark.parametrize(
+    "options",
+    [pytest.param((), id="real time", marks=pytest.mark.nightly), pytest.param(("--lockstep",), id="lock-step")],
+)
+def test_a_flight_that_does_not_begin_anew_is_exit_code_1_and_said(tmp_path, options):
+    text = ON_THE_RUNWAY.replace("XEMU", "NOPE").replace("timeout: 60", "timeout: 180")
+    done = run(tmp_path, text, *options)
+    assert done.returncode == 1
+    assert "on_the_runway, at 2.0 s: reset: reset_flight: " in done.stderr
+    played = json.loads((tmp_path / "out" / "played.json").read_text(encoding="utf-8"))
+    assert not played["finished"]
+
+
+GUST_IN_WIND = """
+name: gust_in_wind
+aircraft: fixed_wing
+start: {altitude: 800, speed: 65, heading: 90}
+events:
+  - {at: 0, hold: {roll: 0, climb: 0, speed: 65}}
+  - at: 1
+    wind: {speed: 5, from_deg: 270}
+    disturb: {kind: gust, from_deg: 270, speed: 8, duration: 3, horizontal_only: true}
+  - {at: 9, end: true}
+"""
+
+
+@pytest.mark.parametrize("options", [(), ("--lockstep",)], ids=["real time", "lock-step"])
+def test_a_disturbance_waits_for_the_wind_before_it(tmp_path, options):
+    done = run(tmp_path, GUST_IN_WIND, *options)
+    assert done.returncode == 0, done.stdout + done.stderr
+    with Bags(tmp_path / "out" / "flight.bag") as bags:
+        states = bags.read("/xplane/flight_state")
+    assert max(states["wind_speed"]) == pytest.approx(13.0, abs=0.5)
+    assert states["wind_speed"][-1] == pytest.approx(5.0, abs=0.5)
+
+
+WIND_AT_THE_END = """
+name: wind_at_the_end
+aircraft: fixed_wing
+start: {altitude: 800, speed: 65, heading: 90}
+events:
+  - {at: 2, wind: {speed: 5, from_deg: 270}}
+  - {at: 2, end: true}
+"""
+
+
+def test_in_lock_step_a_change_under_way_does_not_decide_on_the_last_frame(tmp_path):
+    stamps = []
+    for turn in ("a", "b"):
+        done = run(tmp_path, WIND_AT_THE_END, "--lockstep", out=tmp_path / turn)
+        assert done.returncode == 0, done.stdout + done.stderr
+        with Bags(tmp_path / turn / "flight.bag") as bags:
+            stamps.append(bags.read("/xplane/flight_state", ["header.stamp", "sim_time"]).stamp.tolist())
+    assert len(stamps[0]) == 121, "frame 0, and two seconds"
+    assert stamps[0] == stamps[1]
 
 
 def test_a_missed_criterion_is_exit_code_1(tmp_path):

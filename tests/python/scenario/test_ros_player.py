@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 import threading
@@ -14,7 +13,7 @@ import pytest
 from support.flights.states import state
 from support.room_table import ROOT
 from xplane_bridge.constants import ResultCode
-from xplane_bridge.scenario import ScenarioError, parse_scenario, ros_player
+from xplane_bridge.scenario import ScenarioError, parse_scenario, ros_player, tx_services
 from xplane_bridge.scenario.lockstep_player import LockstepPlayer
 from xplane_bridge.scenario.player import Action
 from xplane_bridge.scenario.ros_player import RosPlayer
@@ -132,7 +131,7 @@ def test_a_repair_without_a_link_is_not_asked_for_again_but_said(monkeypatch):
 
 def test_repairing_what_is_not_broken_is_no_error_but_said(monkeypatch):
     """As in process; tx_node refuses it."""
-    assert ros_player._NOT_BROKEN in (ROOT / "lib/actuation/failure_requests.cpp").read_text(encoding="utf-8")
+    assert tx_services._NOT_BROKEN in (ROOT / "lib/actuation/failure_requests.cpp").read_text(encoding="utf-8")
     repair = {"failure": {"name": "engine_2", "clear": True}}
     broken = [{"at": 0, "failure": {"name": "engine_2"}}]
     answer = '"engine_2" is not broken: expected nothing, all is well'
@@ -146,12 +145,15 @@ def test_repairing_what_is_not_broken_is_no_error_but_said(monkeypatch):
 
 
 def begun(flying):
-    """Starts what carries out a player's actions."""
-    for actions in (flying._of_pilot, flying._of_others):
-        threading.Thread(target=flying._act_all, args=(actions,), daemon=True).start()
+    """Starts what carries out a player's actions; gives the threads of the modes and of the others."""
+    queues = (flying._of_pilot, flying._of_others)
+    workers = [threading.Thread(target=flying._act_all, args=(actions,), daemon=True) for actions in queues]
+    for worker in workers:
+        worker.start()
+    return workers
 
 
-def test_labels_and_modes_do_not_wait_for_a_failure_and_what_does_is_reported(monkeypatch, tmp_path):
+def test_labels_and_modes_do_not_wait_for_a_failure_and_what_does_is_reported(monkeypatch):
     said, labels, carried_out = [], [], []
     scenario = parse_scenario(
         {
@@ -163,20 +165,18 @@ def test_labels_and_modes_do_not_wait_for_a_failure_and_what_does_is_reported(mo
             ],
         }
     )
-    flying = RosPlayer(scenario, "/xplane", log=tmp_path / "played.json", say=said.append)
+    flying = RosPlayer(scenario, "/xplane", say=said.append)
     flying._label_publisher = SimpleNamespace(publish=labels.append)
-    started, shown, asked, done = (threading.Event() for _ in range(4))
+    started, shown, asked = (threading.Event() for _ in range(3))
 
     def fail(value):
         started.set()
         assert shown.wait(10.0)
         carried_out.append(value["name"])
-        if value["name"] == "engine_1":
-            done.set()
 
-    monkeypatch.setattr(flying, "_failure", fail)
+    monkeypatch.setattr(flying._services, "_failure", fail)
     monkeypatch.setattr(flying, "_request_mode", lambda _: asked.set())
-    begun(flying)
+    _, others = begun(flying)
     flying._on_state(state(10.0))
     flying._on_state(state(11.0))
     assert started.wait(10.0)
@@ -186,11 +186,11 @@ def test_labels_and_modes_do_not_wait_for_a_failure_and_what_does_is_reported(mo
     flying._on_state(state(12.375))
     assert carried_out == []
     shown.set()
-    assert done.wait(10.0)
+    flying._of_others.put(None)
+    others.join(10.0)
     assert carried_out == ["aileron1_wing2_left", "engine_1"]
     assert said[-1] == "warning: failure of 1.2 s was carried out 1.1 s late"
-    flying._write_log()
-    (late,) = json.loads((tmp_path / "played.json").read_text(encoding="utf-8"))["late"]
+    (late,) = flying.report()["late"]
     assert (late["action"], late["value"]["name"]) == ("failure", "engine_1")
     assert (late["time"], late["late"]) == (1.25, 1.125)
 
@@ -204,7 +204,7 @@ def test_an_excitation_waits_for_the_first_command_that_is_heard(monkeypatch):
     )  # fmt: skip
     monkeypatch.setitem(sys.modules, "rospy", SimpleNamespace(get_rostime=lambda: None))
     excited = threading.Event()
-    monkeypatch.setattr(flying, "_excitation", lambda _: excited.set())
+    monkeypatch.setattr(flying._services, "_excitation", lambda _: excited.set())
     monkeypatch.setattr(flying, "_message", lambda *_: SimpleNamespace(header=SimpleNamespace(stamp=None)))
     begun(flying)
     flying._on_state(state(10.0))
@@ -220,3 +220,30 @@ def test_an_excitation_waits_for_the_first_command_that_is_heard(monkeypatch):
 def test_in_lock_step_no_link_comes_while_a_frame_waits(monkeypatch):
     with pytest.raises(ScenarioError, match="failure of engine_1: NO_LINK"):
         calls_of(monkeypatch, [NO_LINK, OK], BREAK, LockstepPlayer, check=lambda: None)
+
+
+def test_a_pause_that_lasts_is_said_once(monkeypatch):
+    now, said = [100.0], []
+    monkeypatch.setattr(ros_player.time, "monotonic", lambda: now[0])
+    flying = player({"at": 60, "end": True})
+    monkeypatch.setattr(flying, "_say", said.append)
+    flying._on_state(state(10.0))
+    said.clear()
+
+    def pause(seconds):
+        for _ in range(seconds + 1):
+            flying._on_state(state(12.5, paused=True))
+            now[0] += 1.0
+        flying._on_state(state(12.5))
+
+    pause(4)
+    pause(4)
+    assert said == []
+    flying._outcomes.expect(1, 0.0, "reset")
+    pause(20)
+    assert said == [], "reset_flight has paused it"
+    flying._outcomes.take(SimpleNamespace(events=[SimpleNamespace(number=1, success=True, text="")]))
+    pause(20)
+    pause(20)
+    (text,) = said
+    assert "X-Plane is paused, and scenario time stands at 2.5 s: let it go on" in text

@@ -284,6 +284,24 @@ def test_a_stick_movement_begins_where_the_hold_of_its_axis_has_it():
     assert (begun.throttle, half.throttle) == pytest.approx((held.throttle, held.throttle / 2))
 
 
+@pytest.mark.parametrize("released", ["none", {"speed": None, "roll": None, "pitch": None, "yaw_rate": None}])
+def test_what_a_hold_lets_go_does_not_go_back_to_an_earlier_stick(released):
+    """The lever stays where it is, as without a stick before; a stick that is let go is in its middle."""
+    holds = [
+        {"at": 1, "hold": {"speed": 60, "roll": 0, "pitch": 5, "yaw_rate": 1}},
+        {"at": 5, "hold": released},
+    ]
+    stick = {"throttle": 1.0, "roll": 0.4, "pitch": 0.3, "yaw": -0.2}
+    ends = []
+    for before in ([{"at": 0, "stick": stick}], []):
+        flown = play(Player(scenario(*before, *holds)), 8.0, FlightSample(speed=66.0, roll=3.0))
+        steps = {round(t, 1): c for t, c in flown}
+        assert steps[6.0].throttle == pytest.approx(steps[4.9].throttle, abs=0.02)
+        assert 0.0 < steps[6.0].throttle < 0.95
+        ends.append(steps[7.9].stick)
+    assert ends == [{"roll": 0.0, "pitch": 0.0, "yaw": 0.0}] * 2
+
+
 def test_a_pitch_hold_takes_over_where_the_stick_is():
     """Without an error, the stick is what was integrated: that begins with what the stick was."""
     held = scenario({"at": 0, "stick": {"pitch": 0.25}}, {"at": 1, "hold": {"pitch": LEVEL.pitch}})

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from xplane_bridge.resources import config_file
-from xplane_bridge.scenario import Commands, ScenarioError
+from xplane_bridge.scenario import Commands, ScenarioError, parse_scenario
 from xplane_bridge.scenario.virtual_stick import VirtualStick, load_stick
 
 DEVICES = sorted(file.stem for file in config_file("joysticks", "README.md").parent.glob("*.yaml"))
@@ -139,6 +139,30 @@ def test_mode_buttons_below_0_are_none():
 
 
 @pytest.mark.parametrize(
+    ("content", "commands", "pressed"),
+    [
+        ({"mode": {"toggle": 13, "manual": -1}}, Commands(buttons={13}), 13),
+        ({"mode": {"toggle": 255}}, Commands(buttons={255}), 255),
+        ({"buttons": {"wheels": {"target": "gear", "button": 12}}}, Commands(handles={"gear": 1.0}), 12),
+        ({"functions": {"pause": {"button": 20, "does": "pause"}}}, Commands(buttons={20}), 20),
+        ({"surfaces": {"rudder1": {"axis": 5, "select_button": 21}}}, Commands(buttons={21}), 21),
+    ],
+)
+def test_there_are_as_many_buttons_as_the_file_names(content, commands, pressed):
+    _, buttons = VirtualStick({**device(LEVER), **content}).joy(commands)
+    assert len(buttons) == pressed + 1
+    assert [i for i, down in enumerate(buttons) if down] == [pressed]
+
+
+def test_there_are_the_buttons_that_a_scenario_presses():
+    stick = VirtualStick(device(LEVER))
+    assert len(stick.joy(Commands())[1]) == 12
+    events = [{"at": 0, "buttons": {"press": [12, 3]}}, {"at": 1, "label": "a", "buttons": {"tap": 40}}]
+    stick.provide_buttons(parse_scenario({"name": "test", "events": events}))
+    assert stick.joy(Commands(buttons={12}))[1] == [0] * 12 + [1] + [0] * 28
+
+
+@pytest.mark.parametrize(
     ("content", "commands", "part"),
     [
         ({"direct": {"bank": {"target": "roll", "axis": -1}}}, None, r"direct\.bank names no axis"),
@@ -148,7 +172,6 @@ def test_mode_buttons_below_0_are_none():
         ({}, Commands(handles={"brakes": 0.4}), r"brakes at 0\.4: a button moves it to 0 or 1 only; fly .* commands"),
         ({}, Commands(handles={"brakes": 0.9}), r"brakes at 0\.9: a button"),
         ({}, Commands(handles={"gear": 0.4}), r"gear at 0\.4: a button"),
-        ({}, Commands(buttons={40}), "button 40"),
     ],
 )
 def test_what_a_device_cannot_do_is_said(content, commands, part):
@@ -175,3 +198,11 @@ def test_files_that_are_no_devices_are_said(tmp_path):
     (tmp_path / "latin.yaml").write_bytes(b"device: Kn\xfcppel")
     with pytest.raises(ScenarioError, match=r"latin\.yaml: is not UTF-8 text; expected a file of config/joysticks"):
         load_stick(tmp_path / "latin.yaml")
+
+
+def test_a_section_without_entries_is_none(tmp_path):
+    text = config_file("joysticks", "xbox.yaml").read_text(encoding="utf-8")
+    assert "functions:" not in text
+    (tmp_path / "xbox.yaml").write_text(f"{text}\nfunctions:\n  # none\n", encoding="utf-8")
+    commands = Commands(stick={"roll": 0.5, "pitch": 0.0, "yaw": 0.0})
+    assert load_stick(tmp_path / "xbox.yaml").joy(commands) == VirtualStick(device("xbox")).joy(commands)

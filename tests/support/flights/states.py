@@ -24,6 +24,7 @@ def state(sim_time: float, **values: Any) -> SimpleNamespace:
         0.0,
     )
     rates = SimpleNamespace(x=0.0, y=0.0, z=0.0)
+    flags = {"on_ground": False, "paused": False}
     return SimpleNamespace(
-        **{**known, "epoch": 1, "sim_time_unwrapped": sim_time, "angular_velocity": rates, "on_ground": False, **values}
+        **{**known, **flags, "epoch": 1, "sim_time_unwrapped": sim_time, "angular_velocity": rates, **values}
     )
