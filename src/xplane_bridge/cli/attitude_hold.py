@@ -128,7 +128,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs until ROS ends."""
     args = parser().parse_args(ros_arguments(argv))
     namespace = args.namespace.rstrip("/")
-    start_node("attitude_hold", **lockstep.node_options(namespace))
+    start_node("attitude_hold", namespace, **lockstep.node_options(namespace))
     hold = AttitudeHold({name: getattr(args, name) for name in ("roll", "heading", "pitch", "altitude", "speed")})
     aircraft = [] if args.any_aircraft else [AIRCRAFT]
     FlownLaw(_Stick(hold), "attitude_hold", namespace, aircraft, _REMEDY, _NEEDED).run(args.engage)

@@ -52,6 +52,21 @@ def _field_of_view(name: str, value: str, given: Given) -> str:
     return "" if value == "main" or not _number(name, value, given) else "expected a number, or main"
 
 
+def _namespace(_: str, value: str, __: Given) -> str:
+    """Whether the shell moves nodes away from where the launch files' options and remappings look: at full names.
+
+    What a group around the launch file or `__ns` does is not seen here.
+    """
+    around = os.environ.get("ROS_NAMESPACE", "").strip("/")
+    if not around or value.startswith("/"):
+        return ""
+    place = f"/{around}/{value}"
+    return (
+        f"ROS_NAMESPACE={os.environ['ROS_NAMESPACE']} would put nodes below {place}, while recordings, cameras and "
+        f"programs look for /{value}; unset ROS_NAMESPACE"
+    )
+
+
 def _one_of(*choices: str) -> Check:
     return lambda _, value, __: "" if value in choices else f"expected one of {', '.join(choices)}"
 
@@ -218,6 +233,7 @@ CHECKS: Dict[str, Check] = {
     "frame": lambda *_: "",  # derived: what capture_config is held against
     **dict.fromkeys(("rx", "tx", "capture", "listen_for_beacon", "publish_tf", "configure_xplane", "required"), _flag),
     **dict.fromkeys(("set_points", "lockstep"), _flag),
+    "ns": _namespace,
     "engage": _engage,
     "compression": _one_of("none", "lz4", "bz2"),
     **dict.fromkeys(("bag", "prefix"), _recording),

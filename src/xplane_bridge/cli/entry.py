@@ -129,11 +129,13 @@ def ros_arguments(argv: Optional[Sequence[str]]) -> list[str]:
     return [word for word in given if ":=" not in word]
 
 
-def start_node(name: str, **options: Any) -> Any:
+def start_node(name: str, namespace: Optional[str] = None, **options: Any) -> Any:
     """Make this process a ROS node; gives rospy.
 
     Args:
         name: Of the node.
+        namespace: Of the bridge, below which the node registers: one of the same name ends another's. It does not hold
+            against `__name` and `__ns` on the command line, of which roslaunch gives one. None: ROS_NAMESPACE.
         **options: For rospy.init_node. Unless `disable_signals`, SIGINT and SIGTERM end ROS, and the process with 130
             while init_node still waits for the master.
 
@@ -141,6 +143,9 @@ def start_node(name: str, **options: Any) -> Any:
         NoRosError: rospy is not there, or ROS ended while the master was waited for.
     """
     rospy = rospy_module()
+    if namespace is not None and not {"__name", "__ns"}.intersection(rospy.names.get_mappings()):
+        # init_node refuses a name with a namespace, and rospy reads ROS_NAMESPACE only while it is imported.
+        rospy.names._set_caller_id(f"{namespace.rstrip('/')}/unnamed")
     initialised = threading.Event()
     if not options.pop("disable_signals", False):
         _end_on_signals(rospy, initialised)

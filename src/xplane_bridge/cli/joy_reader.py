@@ -68,7 +68,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     timeout = args.namespace.rstrip("/") + "/joystick_mapper_node/joy_timeout"
     options = (args.device, args.deadzone, args.autorepeat_rate, args.coalesce_interval)
     reader = JoyReader(pygame, *options, rest_s=lambda: rest_s(_parameter(timeout)))
-    _Node(start_node("joy_reader"), pygame, reader, args.namespace).run()
+    _Node(start_node("joy_reader", args.namespace), pygame, reader, args.namespace).run()
     return 0
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 import threading
 from contextlib import contextmanager
@@ -150,10 +151,11 @@ def play(
     stick = stick_of(args.joy_config, args.stick_mode, None) if joystick else None
     if not joystick:
         refuse_buttons(scenario, "--joystick")
-    if log is not None and not log.parent.is_dir():
+    if log is not None and not os.path.isdir(log.parent):  # Path.is_dir() raises below a folder of another user
         raise ScenarioError(f"--log {log}: there is no folder {log.parent}; make it, or give another file")
     namespace = args.namespace.rstrip("/")
-    rospy = start_node(node, argv=None if argv is None else list(argv), **lockstep.node_options(namespace))
+    init_argv = None if argv is None else list(argv)
+    rospy = start_node(node, namespace, argv=init_argv, **lockstep.node_options(namespace))
     if joystick:
         mapped = rospy.get_param(f"{namespace}/joystick_mapper_node", None)
         stick = stick_of(args.joy_config, args.stick_mode, mapped)

@@ -35,6 +35,37 @@ def test_topics_of_a_namespace_of_digits_are_recorded_there(master: RosMaster) -
     assert shlex.split(nodes["record"].args)[-5:] == ["/007/odom", "/tf", *of_camera]
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["bridge.launch", "joystick:=sdl"],
+        ["joystick.launch", "driver:=virtual"],
+        ["camera.launch"],
+        ["record.launch"],
+        ["failure.launch"],
+        ["mavros.launch"],
+    ],
+    ids=lambda words: words[0],
+)
+def test_every_node_is_below_the_namespace(master: RosMaster, words: list[str]) -> None:
+    nodes, _ = load(master, *words, "ns:=lab")
+    assert nodes
+    assert {name: node.namespace for name, node in nodes.items() if not node.namespace.startswith("/lab/")} == {}
+
+
+def test_a_namespace_of_the_shell_is_refused(
+    master: RosMaster, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("ROS_NAMESPACE", "/hall")
+    for file in ("bridge.launch", "failure.launch"):
+        with pytest.raises(Exception, match="check_launch"):
+            load(master, file, "ns:=lab")
+        assert "programs look for /lab; unset ROS_NAMESPACE\n" in capfd.readouterr().err
+    nodes, params = load(master, "rx.launch", "ns:=/hall/lab")
+    assert nodes["rx_node"].namespace == "/hall/lab/"
+    assert params["/hall/lab/port"] == 49000
+
+
 def test_a_scenario_may_lie_in_a_folder_with_a_space(master: RosMaster, tmp_path: Path) -> None:
     file = tmp_path / "left wing" / "mine.yaml"
     file.parent.mkdir()

@@ -59,6 +59,29 @@ def test_what_a_node_reads_is_named_or_has_its_full_path(
 
 
 @pytest.mark.parametrize(
+    ("around", "ns", "place"),
+    [
+        (None, "lab", ""),
+        ("/", "lab", ""),
+        ("/hall", "/hall/lab", ""),
+        ("/hall", "lab", "/hall/lab"),
+        ("hall/", "lab", "/hall/lab"),
+    ],
+)
+def test_a_namespace_around_the_launch_file_is_refused(
+    monkeypatch: pytest.MonkeyPatch, around: str | None, ns: str, place: str
+) -> None:
+    monkeypatch.delenv("ROS_NAMESPACE", raising=False)
+    if around is not None:
+        monkeypatch.setenv("ROS_NAMESPACE", around)
+    begin = f"ns:={ns}: ROS_NAMESPACE={around} would put nodes below {place}, "
+    lines = problems({"ns": ns})
+    assert [line.startswith(begin) and line.endswith("; unset ROS_NAMESPACE") for line in lines] == (
+        [True] if place else []
+    )
+
+
+@pytest.mark.parametrize(
     ("engage", "set_points", "good"),
     [("true", "false", False), ("True", "", False), ("1", "true", True), ("false", "false", True)],
 )

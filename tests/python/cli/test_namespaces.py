@@ -26,9 +26,11 @@ def test_every_program_takes_a_namespace_so() -> None:
     found = {}
     for file in CLI.rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text("utf-8"))):
-            if isinstance(node, ast.Call) and [getattr(each, "value", "") for each in node.args] == ["--namespace"]:
-                found[file.stem] = [getattr(each.value, "id", "") for each in node.keywords if each.arg == "type"]
-    assert len(found) >= 11
+            options = [getattr(each, "value", "") for each in node.args] if isinstance(node, ast.Call) else []
+            if options in (["--namespace"], ["--mavros"]):
+                kinds = [getattr(each.value, "id", "") for each in node.keywords if each.arg == "type"]
+                found[file.stem, options[0]] = kinds
+    assert len(found) >= 12
     assert {name for name, kind in found.items() if kind != ["absolute"]} == set()
 
 

@@ -65,6 +65,6 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     law = make_controller(args.controller, arguments_of(args.arguments))
     wanted = [] if args.any_aircraft else aircraft_of(args.controller)
     namespace = args.namespace.rstrip("/")
-    start_node("fly_controller", **lockstep.node_options(namespace))
+    start_node("fly_controller", namespace, **lockstep.node_options(namespace))
     FlownLaw(law, "fly_controller", namespace, wanted).run(args.engage)
     return 0

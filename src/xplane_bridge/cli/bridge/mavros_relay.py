@@ -21,7 +21,9 @@ def parser() -> argparse.ArgumentParser:
         description="Pose, velocity and heading under MAVROS's names, and set-points (docs/setups/mavros.md).",
     )
     p.add_argument("--namespace", type=absolute, default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
-    p.add_argument("--mavros", default="/mavros", metavar="NS", help="where MAVROS's names begin (%(default)s)")
+    p.add_argument(
+        "--mavros", type=absolute, default="/mavros", metavar="NS", help="where MAVROS's names begin (%(default)s)"
+    )
     p.add_argument("--set-points", action="store_true", help=f"fly set-points on control/auto ({AIRCRAFT} only)")
     p.add_argument("--engage", action="store_true", help="with --set-points: ask for mode AUTO")
     return p
@@ -129,7 +131,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     if args.engage and not args.set_points:
         p.error(f"--engage needs --set-points, which are flown in mode AUTO; they are for {AIRCRAFT} only")
     namespace, mavros = args.namespace.rstrip("/"), args.mavros.rstrip("/")
-    start_node("mavros_relay")
+    start_node("mavros_relay", namespace)
     import rospy
 
     relay = Relay(namespace, mavros)
