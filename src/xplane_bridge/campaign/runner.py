@@ -65,7 +65,7 @@ class CampaignFolder:
         """Flies what is missing, and writes the table.
 
         Args:
-            campaign: What to fly.
+            campaign: What to fly; a folder that has flights is flown on as `load` gives it.
             executor: Who flies.
             progress: Called with how many further flights have a row.
 
@@ -77,6 +77,7 @@ class CampaignFolder:
             (self.folder / PARTS).mkdir(parents=True, exist_ok=True)
             with self._locked():
                 self._claim(campaign, getattr(executor, "fingerprint", fingerprint)(campaign))
+                campaign = self.load()  # draws go to parameters by their order: that of the flights that are there
                 for left in (self.folder / PARTS).glob("*.tmp"):
                     left.unlink()
                 table = self._fly_rounds(campaign, executor, progress)

@@ -12,7 +12,7 @@ from typing import Mapping, Optional, Sequence
 from tqdm import tqdm
 
 from xplane_bridge.cli.entry import guarded, number, positive
-from xplane_bridge.export import campaign
+from xplane_bridge.export import campaign, made
 from xplane_bridge.export.flight import ExportError
 from xplane_bridge.export.formats import ALIASES, FORMATS, Job
 from xplane_bridge.export.pictures import Options
@@ -147,13 +147,31 @@ def _jobs(args: argparse.Namespace, output: Path) -> list[Job]:
     dataset = Options(**{name: value for name, value in chosen.items() if value is not None})
     topics = tuple(args.topics or ())
     named = campaign.flights(args.bags)
-    training = campaign.choose_training(named, dataset)
+    training = _training(named, dataset, output, args.format)
     jobs = []
     for name, bags in sorted(named.items()):
         labels, digest = _labels(args, name, named)
         job = Job(name, bags, str(output.resolve()), args.format, args.rate, topics, dataset, name in training)
         jobs.append(job._replace(labels=labels, labels_sha256=digest))
     return jobs
+
+
+def _training(named: Mapping[str, Sequence[str]], dataset: Options, output: Path, form: str) -> set[str]:
+    """Draw the flights that train, over those that the folder has too; says which of these change their split."""
+    if dataset.split_by != "flight":
+        return set()
+    there = made.sides(output, form)
+    training = campaign.choose_training({*named, *there}, dataset)
+    for name, trained in sorted(there.items()):
+        if trained != (name in training):
+            old, new = ("train", "validation") if trained else ("validation", "train")
+            stays = "" if name in named else ", and stays there: give all flights in one command"
+            print(
+                f"{name}: the draw over all {form} flights of {output} puts it into {new}; it was exported into "
+                f"{old}{stays}",
+                file=sys.stderr,
+            )
+    return training
 
 
 def _labels(args: argparse.Namespace, name: str, flights: Mapping[str, Sequence[str]]) -> tuple[str, str]:

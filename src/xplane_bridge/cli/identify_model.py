@@ -35,8 +35,9 @@ def parser() -> argparse.ArgumentParser:
         help="how long the motion is followed after each excitation; default: %(default)s",
     )  # fmt: skip
     p.add_argument(
-        "--validate", type=int, metavar="ID", help="number of the excitation (excitation/state) kept for validation"
-    )
+        "--validate", metavar="ID",
+        help="number of the excitation (excitation/state) kept for validation; of several with number 1: 1.1, 1.2, ...",
+    )  # fmt: skip
     p.add_argument("--report", metavar="FILE", help="also write a page (HTML, needs no network)")
     p.add_argument("--accept", action="store_true", help="write the model in spite of what speaks against it")
     add_output_arguments(p)
@@ -86,9 +87,9 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     return 0
 
 
-def _without_validate(result: AxisResult, validate: Optional[int]) -> str:
+def _without_validate(result: AxisResult, validate: Optional[str]) -> str:
     """For a hint to identify one axis: --validate is refused there where its excitation does not move that axis."""
-    own = [window.excitation.number for window in result.windows + result.validation]
+    own = [window.excitation.name for window in result.windows + result.validation]
     return "" if validate is None or validate in own else " without --validate"
 
 

@@ -137,6 +137,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     campaign = load_campaign(args.campaign, args.flights)
     with executor_of(args) as executor, tqdm(total=campaign.flights, unit="flight", disable=None) as bar:
         table = folder.fly(campaign, executor, bar.update)
+    campaign = folder.load()  # as it was flown: the file may name the same parameters in another order
     print(render(campaign, table))
     write_page(folder, campaign, table)
     print(f"{campaign.name}: {len(table)} flights in {args.output / TABLE}, drawn in {args.output / PAGE}")

@@ -74,6 +74,17 @@ def records(output: Path) -> Iterator[tuple[str, str, dict[str, Any]]]:
             yield ALIASES.get(form, form), path.stem, content
 
 
+def sides(output: Path, form: str) -> dict[str, bool]:
+    """Give the flights that the folder has in a format, each whole in one split, and whether each trains.
+
+    Raises:
+        ExportError: A file of the records is none.
+    """
+    found = {name: made["record"].get("parameters") for own, name, made in records(output) if own == form}
+    trains = {name: given.get("train_flight") for name, given in found.items() if isinstance(given, dict)}
+    return {name: side for name, side in trains.items() if isinstance(side, bool)}
+
+
 def read_record(path: Path) -> Optional[dict[str, Any]]:
     """Read what is kept of a flight's export; None where there is nothing, or no JSON.
 

@@ -79,7 +79,7 @@ def identify(
     geometry: Optional[Geometry] = None,
     aircraft: str = "",
     tail: float = TAIL_S,
-    validate: Optional[int] = None,
+    validate: Optional[str] = None,
 ) -> Identification:
     """Identify the axes that a flight's excitations move.
 
@@ -89,8 +89,8 @@ def identify(
         geometry: Sizes of the aircraft, for derivatives as coefficients.
         aircraft: Its name, for the file.
         tail: How long the motion is followed after an excitation [s].
-        validate: Number of the excitation that is kept for validation of the axes that it moves; None: chosen, as for
-            the others.
+        validate: Name of the excitation that is kept for validation of the axes that it moves; None: chosen, as for the
+            others.
 
     Raises:
         IdentificationError: There is nothing to identify from. A model that is not to be used is no exception: see
@@ -103,13 +103,15 @@ def identify(
     for name in names:
         usable[name], unknown = with_known_inputs(windows, AXES[name])
         reasons += unknown
-    asked = sorted({w.excitation.number for mine in usable.values() for w in mine})
-    if validate is not None and asked and validate not in asked:
-        numbers = ", ".join(map(str, asked))
+    known = {w.excitation.name for mine in usable.values() for w in mine}
+    if validate is not None and known and validate not in known:
+        have = ", ".join(w.excitation.name for w in windows if w.excitation.name in known)
         of_axis = "" if axis is None else f" for the {axis} axis"
         about = f"excitation {validate} "
         left_out = "".join(f"; {note}" for note in (*notes, *reasons) if about in note)
-        msg = f"{about}cannot be kept for validation; {flight.name} has{of_axis}: {numbers}{left_out}"
+        if any(name.startswith(f"{validate}.") for name in known):
+            left_out += f"; {validate}.1 is the first one of number {validate}: numbers begin anew with tx_node"
+        msg = f"{about}cannot be kept for validation; {flight.name} has{of_axis}: {have}{left_out}"
         raise IdentificationError(msg)
     results = {}
     for name, mine in usable.items():
@@ -132,7 +134,7 @@ def identify(
 
 
 def identify_axis(
-    windows: list[Window], axis: Axis, geometry: Optional[Geometry] = None, validate: Optional[int] = None
+    windows: list[Window], axis: Axis, geometry: Optional[Geometry] = None, validate: Optional[str] = None
 ) -> AxisResult:
     """Identify one axis from its windows.
 
@@ -188,11 +190,11 @@ def _moved_inputs(windows: list[Window], axis: Axis) -> tuple[Signal, ...]:
     return moved
 
 
-def _split(windows: list[Window], validate: Optional[int]) -> tuple[list[Window], list[Window]]:
+def _split(windows: list[Window], validate: Optional[str]) -> tuple[list[Window], list[Window]]:
     """The windows to fit, and those kept for validation: of each target that has enough its last one."""
-    if validate in [w.excitation.number for w in windows]:
-        spare = [w for w in windows if w.excitation.number == validate]
-        rest = [w for w in windows if w.excitation.number != validate]
+    if validate in [w.excitation.name for w in windows]:
+        spare = [w for w in windows if w.excitation.name == validate]
+        rest = [w for w in windows if w.excitation.name != validate]
         if not rest:
             msg = f"{spare[0].excitation.label} is the only window: nothing would be left to fit; fly one more"
             raise IdentificationError(msg)

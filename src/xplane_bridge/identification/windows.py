@@ -55,6 +55,12 @@ class Excitation:
     start: float  #: raw simulator time [s]
     end: float
     result: str
+    run: int = 0  #: which one of its number, from 1 on; 0: the only one
+
+    @property
+    def name(self) -> str:
+        """Its number; of several that have it `1.1`, `1.2`, ..."""
+        return f"{self.number}.{self.run}" if self.run else str(self.number)
 
     @property
     def axes(self) -> set[str]:
@@ -64,7 +70,7 @@ class Excitation:
     @property
     def label(self) -> str:
         """For the reader."""
-        return f"excitation {self.number} ({self.kind} on {', '.join(self.targets)})"
+        return f"excitation {self.name} ({self.kind} on {', '.join(self.targets)})"
 
 
 @dataclass
@@ -159,6 +165,10 @@ def read_excitations(table: Table) -> list[Excitation]:
             out[-1].result = str(table["result"][k])
             if np.isfinite(table["end_sim_time"][k]):
                 out[-1].end = float(table["end_sim_time"][k])
+    numbers = [each.number for each in out]
+    for k, each in enumerate(out):
+        if numbers.count(each.number) > 1:
+            each.run = numbers[: k + 1].count(each.number)
     return out
 
 

@@ -126,7 +126,7 @@ def read_table(path: Path, airport: Airport) -> dict[str, float]:
     ends = {end.number for runway in airport.runways for end in runway.ends}
     heights: dict[str, float] = {}
     try:
-        with path.open(encoding="utf-8", newline="") as file:
+        with path.open(encoding="utf-8-sig", newline="") as file:
             for number, row in enumerate(csv.reader(file), 1):
                 words = [word.strip() for word in row]
                 if not any(words) or words[0].startswith("#"):

@@ -33,7 +33,7 @@ def build(found: Identification, flight: Flight) -> str:
         ):
             for window, run in zip(windows, runs):
                 figure = _figure(window, run, result, use)
-                title = f"{name.capitalize()} {use} {window.excitation.number}: {figure.title}"
+                title = f"{name.capitalize()} {use} {window.excitation.name}: {figure.title}"
                 sections.append((figure.key, title, interactive.draw(figure, int(window.stamp[0]))))
     subtitle = f"{flight.name} \u00b7 {day_of(flight.start)}"
     return page(f"Identified model: {found.model.aircraft or flight.name}", subtitle, sections)
@@ -127,4 +127,4 @@ def _figure(window: Window, run: np.ndarray, result: AxisResult, use: str) -> Ti
                 series.append(Series("model", stamp, factor * simulated[:, k], dashed=True))
             panels.append(Panel(f"{signal.name.replace('_', ' ')} [{unit}]", series))
     e = window.excitation
-    return TimeFigure(f"{model.axis.name}-{use}-{e.number}", f"{e.kind} on {', '.join(e.targets)}", panels)
+    return TimeFigure(f"{model.axis.name}-{use}-{e.name}", f"{e.kind} on {', '.join(e.targets)}", panels)

@@ -125,6 +125,31 @@ def test_split_by_flight_keeps_flights_whole_and_is_seeded(tmp_path: Path) -> No
     assert visible(tmp_path / "a") == visible(tmp_path / "b")
 
 
+def test_a_flight_that_is_exported_again_alone_keeps_its_split(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    bags = [write_flight(tmp_path / f"{name}.bag", 0.4, offset=10.0 * k) for k, name in enumerate("abcd")]
+    arguments = ["--format", "imagefolder", "--split-by", "flight", "-o", tmp_path / "out", "--jobs", "1"]
+
+    def trains() -> dict[str, bool]:
+        records = json.loads((tmp_path / "out" / "manifest.json").read_text())["exports"]["imagefolder"]
+        return {name: record["parameters"]["train_flight"] for name, record in records.items()}
+
+    assert export(*bags[:3], *arguments) == 0
+    drawn = {"a": True, "b": False, "c": True}
+    assert trains() == drawn
+    for bag in bags[:3]:
+        assert export(bag, *arguments, "--keep-bad-frames") == 0
+        assert trains() == drawn
+    assert "the draw over" not in capsys.readouterr().err
+    # A fourth flight draws anew: of flights that are not in the command the folder keeps the earlier draw.
+    moved = f"b: the draw over all imagefolder flights of {tmp_path / 'out'} puts it into train; it was exported into"
+    assert export(bags[3], *arguments) == 0
+    assert trains() == {**drawn, "d": False}
+    assert f"{moved} validation, and stays there: give all flights in one command\n" in capsys.readouterr().err
+    assert export(*bags, *arguments) == 0
+    assert trains() == {"a": True, "b": True, "c": True, "d": False}
+    assert capsys.readouterr().err.count(f"{moved} validation\n") == 1
+
+
 def test_an_interrupted_export_goes_on_and_verify_finds_what_changed(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:

@@ -50,7 +50,7 @@ def test_the_file_lies_beside_the_bag_and_says_how_it_was_made(
 def test_heights_of_a_table_make_labels_surer(tmp_path: Path) -> None:
     bag = write_approach(tmp_path / "flight.bag", 1)
     heights = tmp_path / "heights.csv"
-    heights.write_text("# surveyed\n15, 0.0\n33, 0.0\n")
+    heights.write_text("15, 0.0\n# surveyed\n33, 0.0\n", encoding="utf-8-sig")  # as spreadsheets save UTF-8
     sigmas = []
     for arguments in ([], ["--heights", heights]):
         assert label(bag, *arguments, "-o", tmp_path / "l.jsonl") == 0

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from support.flights.export_flight import export, files_of, write_flight
+from xplane_bridge.export.made import RECORDS, SCHEMA, sides
 
 
 @pytest.fixture(name="days")
@@ -138,3 +139,12 @@ def test_a_record_of_something_else_is_said_before_anything_is_made(
     assert f"{record}: no record of a flight's export; expected one that bag_export wrote: move this file away" in err
     assert err.count("\n") == 1
     assert list(files_of(tmp_path / "out")) == [f".flights/csv/{name}.json"]
+
+
+@pytest.mark.parametrize("parameters", [None, [], {}, {"train_flight": None}, {"train_flight": True}])
+def test_only_a_record_that_has_a_side_has_one(tmp_path: Path, parameters: object) -> None:
+    content = {"key": {"schema": SCHEMA, "sources": []}, "record": {"files": {}, "parameters": parameters}}
+    file = tmp_path / RECORDS / "imagefolder" / "a.json"
+    file.parent.mkdir(parents=True)
+    file.write_text(json.dumps(content), encoding="utf-8")
+    assert sides(tmp_path, "imagefolder") == ({"a": True} if parameters == {"train_flight": True} else {})

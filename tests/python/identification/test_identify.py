@@ -106,16 +106,16 @@ def test_a_window_that_was_not_used_validates(found: dict[str, AxisResult]) -> N
 
 
 def test_a_window_that_is_named_validates_its_axis_and_leaves_the_other_alone(calm: Recording) -> None:
-    results = identify(calm.flight(), validate=2).results
+    results = identify(calm.flight(), validate="2").results
     assert [w.excitation.number for w in results["longitudinal"].validation] == [2]
     assert [w.excitation.number for w in results["lateral"].validation] == [6, 9]
     with pytest.raises(IdentificationError, match=r"excitation 2 cannot .* flown has for the lateral axis: 4, 5, 6"):
-        identify(calm.flight(), "lateral", validate=2)
+        identify(calm.flight(), "lateral", validate="2")
 
 
 def test_an_input_that_only_the_validating_window_moves_is_left_out(calm: Recording) -> None:
     rows = [row for row in calm.excitation if row["id"] in (4, 5, 7)]
-    model = identify(without(calm, excitation=rows), validate=7).results["lateral"].model
+    model = identify(without(calm, excitation=rows), validate="7").results["lateral"].model
     assert ([signal.name for signal in model.inputs], model.b.shape) == (["aileron"], (4, 1))
     assert any("7 (3-2-1-1 on yaw) moves rudder, which no fitted window does" in text for text in model.warnings)
 
@@ -466,7 +466,7 @@ def test_a_window_of_an_unknown_input_is_left_out_for_its_axis_alone(calm: Recor
     assert [w.excitation.number for w in found.results["lateral"].windows] == [4, 5, 7, 8]
     assert [w.excitation.number for w in found.results["longitudinal"].windows] == [1, 2]
     with pytest.raises(IdentificationError, match=r"9 cannot be kept .* 6, 7, 8; excitation 9 .* rudder not known"):
-        identify(without(calm, surfaces=rows), validate=9)
+        identify(without(calm, surfaces=rows), validate="9")
 
 
 def test_an_axis_without_a_model_does_not_take_that_of_the_other(calm: Recording) -> None:
@@ -493,6 +493,6 @@ def test_an_axis_or_a_window_that_is_not_there_is_refused(short: Recording) -> N
     with pytest.raises(IdentificationError, match=r"no excitation moves the lateral axis; there is: excitation 1"):
         identify(short.flight(), "lateral")
     with pytest.raises(IdentificationError, match="excitation 7 cannot be kept for validation; flown has: 1"):
-        identify(short.flight(), validate=7)
+        identify(short.flight(), validate="7")
     with pytest.raises(IdentificationError, match="is the only window: nothing would be left to fit"):
-        identify(short.flight(), validate=1)
+        identify(short.flight(), validate="1")

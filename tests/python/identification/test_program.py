@@ -100,6 +100,27 @@ def test_the_page_needs_no_network_and_shows_every_window(bag: Path, tmp_path: P
     assert "longitudinal" not in without_plotly.lower()
 
 
+def test_each_of_several_excitations_of_one_number_has_a_name(
+    twin: FlightModel, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    recording = flown(PITCH, model=twin)
+    recording.excitation = [{**row, "id": max(1, row["id"] - 1)} for row in recording.excitation]  # 1, 1, 2
+    bag, page, model = recording.write(tmp_path / "flight.bag"), tmp_path / "model.html", tmp_path / "model.yaml"
+    assert identify_model.main([str(bag), "--validate", "1"]) == 1
+    error = capsys.readouterr().err
+    assert (
+        "excitation 1 cannot be kept for validation; flight has: 1.1, 1.2, 2; 1.1 is the first one of number" in error
+    )
+    for kept, fitted in (("2", ["1.1", "1.2"]), ("1.2", ["1.1", "2"])):
+        assert identify_model.main([str(bag), "--validate", kept, "--report", str(page), "-o", str(model)]) == 0
+        keys = [*(f"longitudinal-fitted-{name}" for name in fitted), f"longitudinal-validation-{kept}"]
+        text = page.read_text(encoding="utf-8")
+        assert re.findall(r'id="figure-(longitudinal-[\w.-]+)"', text) == keys
+        assert re.findall(r'<section id="(longitudinal-[\w.-]+)"', text) == keys
+        used = [label.split()[1] for label in files.read_model(model).source["windows"]]
+        assert used == fitted
+
+
 def test_values_are_printed_with_intervals_and_warnings_once(
     twin: FlightModel, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
