@@ -392,6 +392,11 @@ void SimLink::updateStop(std::int64_t now_ns) {
   }
   if (stop_phase_ == StopPhase::kDone) {
     reader_.cancelAll();
+    // In lock-step each has its fence, which the simulator would send for ever.
+    for (const Group& group : groups_) hub_->ignore(*group.source);  // those of one that is silent
+    for (const SourcePtr& source : {control_source_, rpos_source_}) {
+      if (source != nullptr) hub_->ignore(*source);
+    }
     quit_ = true;
   }
 }

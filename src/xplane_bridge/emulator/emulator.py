@@ -78,6 +78,7 @@ class Emulator:
         self._frames = 0
         self._truth_frame = -1
         self._picture = 0  # number of the frame that the window shows
+        self._run_began = 0  # frames before the run: lock-step numbers those of each run from 1
         self._loading_until = -math.inf
         self._sent_at: List[float] = []
         self._jitter = np.random.default_rng(options.seed)
@@ -238,12 +239,12 @@ class Emulator:
                 self._wait_for_picture(self.view)
             else:
                 wait_until_shown(self.view, self._frames, lambda: self.stopping)
-            self._picture = self._frames
+            self._picture = self._frames - self._run_began
 
     def _picture_is_due(self) -> bool:
         if self._frames % 2 and "window-changes" in self.options.otherwise:
             return False
-        return self._picture == 0 or (self._frames - 1) % self.options.picture_every == 0
+        return self._picture == 0 or (self._frames - self._run_began - 1) % self.options.picture_every == 0
 
     def _send(self, now: float) -> None:
         sim = self.sim
@@ -400,6 +401,9 @@ class Emulator:
         while self._frames < frames and not self.stopping:
             self.step_frames(1)
 
+    def _begin_run(self) -> None:
+        self._run_began, self._picture = self._frames, 0
+
     def _after_fence(self) -> None:
         self._write_truth()
         collect_seldom(self._frames)
@@ -409,6 +413,7 @@ class Emulator:
         self._lockstep = LockstepLoop(
             lambda: self.server,
             fences,
+            self._begin_run,
             lambda: self.step_frames(1),
             self._after_fence,
             self._send,

@@ -9,6 +9,7 @@ simulator fly on from that frame; the program that writes it gets its frames fir
 have answered.
 
 Frame 0 does not fly: it is sent again and again, in real time, until it is answered, so that clients can subscribe.
+When the last client has ended its fences, the next run begins with a frame 0 of its own.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class Fences:
     """Who wants fences, and which frame was answered last."""
 
     def __init__(self) -> None:
-        self.answered = -1  #: number of the newest frame that may be left; -1: none
+        self.answered = -1  #: number of the newest frame that may be left; -1: none, a run begins
         self._clients: Dict[Address, Dict[int, int]] = {}  # of a client: its index to the element
         self._groups: Dict[Address, Address] = {}  # of a client: the first socket of its group
         self._always: List[Address] = []  # who gets every fence: first sockets of groups, and those of no group
@@ -71,6 +72,8 @@ class Fences:
             self._groups.pop(client, None)
         if not indices:
             del self._clients[client]
+            if not self._clients:
+                self.answered, self._answers = -1, None
         self._pairs = {each: tuple(elements.items()) for each, elements in self._clients.items()}
         self._always = [each for each in self._clients if self._groups.get(each, each) == each]
         self._layouts.clear()
@@ -80,12 +83,17 @@ class Fences:
         """Takes the answer to a frame; returns whether it is one."""
         if not request.path.startswith(FENCE) or _ELEMENT.fullmatch(request.path) is None:
             return False
-        if math.isfinite(request.value):
+        # Before frame 0 is answered, an answer to another frame is one to a run that has ended.
+        if math.isfinite(request.value) and (self.answered >= 0 or request.value < 1.0):
             self.answered = max(self.answered, int(request.value))
             if client != self._answers:
                 self._answers = client
                 self._layouts.clear()
         return True
+
+    def awaits(self, frame: int) -> bool:
+        """Whether the answer to this frame is still to come; not to one whose clients have all left."""
+        return self.answered < frame and (frame == 0 or self.answered >= 0)
 
     def send(self, server: Server, now: float, frame: int, sim_time: float, picture: int = 0) -> None:
         """Ends a frame: sends what the server has held of it, with the fences.
@@ -155,6 +163,7 @@ class LockstepLoop:
     Args:
         server: Gives the sockets.
         fences: Of these.
+        begin: Called when a run begins: its frames are numbered from 1.
         fly: Flies a frame and sends what is due in it.
         after_fence: Does what remains of a frame, while clients answer it.
         hold: Sends what is due without flying; gets the time on the loop's clock [s].
@@ -169,6 +178,7 @@ class LockstepLoop:
         self,
         server: Callable[[], Server],
         fences: Fences,
+        begin: Callable[[], None],
         fly: Callable[[], None],
         after_fence: Callable[[], None],
         hold: Callable[[float], None],
@@ -180,6 +190,7 @@ class LockstepLoop:
     ) -> None:
         self._server = server
         self._fences = fences
+        self._begin = begin
         self._fly = fly
         self._after_fence = after_fence
         self._hold = hold
@@ -192,34 +203,51 @@ class LockstepLoop:
 
     def run(self, frames: Optional[int], stopping: Callable[[], bool]) -> None:
         """Flies so many frames; None: until `stopping` says so."""
+        flown = 0
+        while (frames is None or flown < frames) and not stopping():
+            self._hold_frame_0(stopping)
+            flown += self._fly_run(None if frames is None else frames - flown, stopping)
+
+    def _hold_frame_0(self, stopping: Callable[[], bool]) -> None:
+        """Begins a run: repeats frame 0 until it is answered."""
+        self._begin()
+        self._server().restart_pacers()
         held = 0
-        while self._fences.answered < 0 and not stopping():
+        while self._fences.awaits(0) and not stopping():
             self._hold(held * self._period)
             self._fences.send(self._server(), held * self._period, 0, self._sim_time())
             held += 1
             self._await(0, self._period, stopping)
         self._server().restart_pacers()
+
+    def _fly_run(self, frames: Optional[int], stopping: Callable[[], bool]) -> int:
+        """Flies so many frames, or until all clients have left; returns how many it has flown."""
         began, frame = time.monotonic(), 0
-        while (frames is None or frame < frames) and not stopping():
+        while (frames is None or frame < frames) and self._fences.answered >= 0 and not stopping():
             frame += 1
             if self._pace > 0.0:
                 time.sleep(max(0.0, began + frame * self._period / self._pace - time.monotonic()))
             self._fly()
+            if self._fences.answered < 0:  # all have left since the frame before it was answered
+                self._server().take_held()
+                self._after_fence()
+                return frame
             self._fences.send(self._server(), frame * self._period, frame, self._sim_time(), self._picture())
             sent = time.monotonic()
             self._after_fence()
-            while self._fences.answered < frame and not stopping():
+            while self._fences.awaits(frame) and not stopping():
                 self._await(frame, _PATIENCE_S, stopping)
             self.waited += time.monotonic() - sent
+        return frame
 
     def _await(self, frame: int, patience: float, stopping: Callable[[], bool]) -> None:
         """Takes what clients send until the answer to this frame, so long at most [s]."""
         end = time.monotonic() + patience
         server = self._server()
-        while not stopping() and self._fences.answered < frame:
+        while not stopping() and self._fences.awaits(frame):
             self._idle()
             left = end - time.monotonic()
             if left <= 0.0:
                 return
             if select.select([server], [], [], left)[0]:
-                server.receive(enough=lambda: self._fences.answered >= frame)
+                server.receive(enough=lambda: not self._fences.awaits(frame))

@@ -43,7 +43,7 @@ class ScriptedHub : public DatagramHub {
     std::vector<Sent> sent;
     bool refuses = false;       // to send
     std::uint64_t dropped = 0;  // as the kernel counts it, of each source
-    std::vector<std::string> opened;
+    std::vector<std::string> opened, ignored;
     std::vector<std::string> awaited;  // of waitFor()
     std::string listened_to;           // by fdFor(); empty: by none, "any"
 
@@ -63,7 +63,10 @@ class ScriptedHub : public DatagramHub {
     return source;
   }
   void wake() override {}
-  void ignore(const DatagramSource& source) override { static_cast<const Source&>(source).ignored = true; }
+  void ignore(const DatagramSource& source) override {
+    static_cast<const Source&>(source).ignored = true;
+    wire_->ignored.push_back(static_cast<const Source&>(source).name);
+  }
   void wait(int timeout_ms) override {
     const std::int64_t end_ns = wire_->now_ns + timeout_ms * kNanosecondsPerMillisecond;
     std::deque<Arrival>& arrivals = wire_->arrivals;

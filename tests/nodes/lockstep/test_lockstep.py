@@ -195,6 +195,18 @@ def test_it_holds_and_flies_on_as_asked(world):
     assert world.call("lockstep/hold", Trigger).success
 
 
+def test_a_bridge_that_is_started_again_flies_on_where_the_one_before_ended(world):
+    _, *nodes = start(world, participants=[], watchdog=30.0)
+    assert step(world, 5).flown == 5
+    for node in nodes:
+        node.stop()
+    for name in ("rx_node", "tx_node"):
+        world.start(name)
+    answer = step(world, 7)
+    assert answer.flown == 7
+    assert answer.sim_time > 11.9 / 60  # some frames more have flown while the first one gave back what it had taken
+
+
 def test_hold_ends_however_many_steps_wait(world):
     from std_srvs.srv import Trigger
     from xplane_bridge.msg import FlightState

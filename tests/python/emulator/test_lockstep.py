@@ -30,6 +30,10 @@ class Client(XPlaneClient):
         self.subscribe(paths, rate_hz)
         self.subscribe([f"{FENCE}[{element}]" for element in range(4)], first_index=FENCE_INDEX)
 
+    def leave(self):
+        for element in range(4):
+            self.send(protocol.RrefRequest(0, FENCE_INDEX + element, f"{FENCE}[{element}]"))
+
     def answer(self, frame):
         self.send(protocol.DrefWrite(FENCE, float(frame)))
 
@@ -347,6 +351,52 @@ def test_a_frame_whose_window_is_gone_ends_the_emulator():
     with pytest.raises(BrokenPipeError, match="the window was closed"):
         emulator.step_frames(1)
     emulator.close()
+
+
+def test_another_run_begins_at_frame_0_when_all_clients_have_left(fly):
+    emulator = fly(picture_every=2)
+    emulator.view = renderer = Renderer()
+    renderer.ready.set()
+    first = Client(emulator.port)
+    first.ask([TIME])
+    first.leave_hold()
+    for number in (1, 2):
+        first.answer(number)
+        first.frame()
+    first.leave()
+    first.answer(3)  # comes too late to be that of a frame
+    second = Client(emulator.port)
+    second.ask([TIME], rate_hz=10)
+    fence, pairs = second.leave_hold()
+    assert fence == [1, 0, 80_000]  # the flight goes on
+    assert pairs == [(0, pytest.approx(0.08))]
+    assert second.picture == 1
+    second.answer(1)
+    assert second.frame() == ([2, 0, 100_000], [])
+    assert renderer.frames == [1, 3, 4]
+
+
+def test_a_frame_after_whose_let_go_all_have_left_is_sent_to_no_later_client(fly):
+    port = fly(pace=0.02).port  # a frame a second: they leave while it waits to fly the second one
+    first, second = Client(port), Client(port)
+    first.ask([TIME])
+    first.leave_hold()
+    first.answer(1)
+    time.sleep(0.2)
+    first.leave()
+    second.ask([TIME])
+    assert second.frame()[0][0] == 0
+
+
+def test_who_leaves_while_others_stay_does_not_end_the_run(fly):
+    port = fly().port
+    stays, leaves = Client(port), Client(port)
+    leaves.ask([TIME])
+    stays.ask([TIME])
+    assert stays.leave_hold()[0][0] == 1
+    leaves.leave()
+    stays.answer(1)
+    assert stays.frame()[0][0] == 2
 
 
 def test_pace_bounds_the_speed_from_above_only(fly):

@@ -469,6 +469,14 @@ TEST_F(ScriptedLink, SameScriptGivesTheSameDatagrams) {
   EXPECT_EQ(delivered[0], delivered[1]);
 }
 
+TEST_F(ScriptedLink, AtItsEndNoSourceIsLeftForWhichLockstepSendsFences) {
+  SimLinkOptions options = defaults();
+  options.rpos_rate_hz = 20;
+  makeLink(options);
+  link_->stop(0.1);  // X-Plane is silent: its group is not ended otherwise
+  EXPECT_EQ(wire_->ignored, (std::vector<std::string>{"flight", "control", "rpos"}));
+}
+
 TEST_F(ScriptedLink, CallsBeyondABoundAreCountedInsteadOfKept) {
   makeLink();
   for (int i = 0; i < 2000; ++i) {
