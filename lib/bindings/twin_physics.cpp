@@ -108,13 +108,15 @@ void SurfaceActuator::step(const SurfaceOrder& order, double dt, double alpha_de
   const double target = order.target_deg.value_or(position_deg);
   if (order.fault != SurfaceFault::kHealthy) {
     stepBroken(order, target, dt, alpha_deg);
-  } else if (order.overridden) {
-    position_deg = effective_deg = target;
+    return;
+  }
+  if (order.overridden) {
+    position_deg = target;
   } else {
     approach(clip(target, minimum_deg, maximum_deg), rate_deg_s * dt);
-    effective_deg = position_deg;
-    stuck_deg.reset();
   }
+  effective_deg = position_deg;
+  stuck_deg.reset();
 }
 
 void SurfaceActuator::stepBroken(const SurfaceOrder& order, double target_deg, double dt, double alpha_deg) {

@@ -227,7 +227,7 @@ class Emulator:
             return
         sim.step(period)
         if self.options.send_while_paused or not sim.clocks.paused:
-            self._send(now)
+            self._send(now, max(period, self.period))
         server.flush_delayed(now)
         if self._xplane_connect is not None:
             self._xplane_connect.answer()
@@ -246,11 +246,11 @@ class Emulator:
             return False
         return self._picture == 0 or (self._frames - self._run_began - 1) % self.options.picture_every == 0
 
-    def _send(self, now: float) -> None:
+    def _send(self, now: float, period: float) -> None:
         sim = self.sim
         self.server.send_frame(
             now,
-            self.period,
+            period,
             sim.rows,
             sim.store.values,
             sim.selected_rows,
@@ -416,7 +416,7 @@ class Emulator:
             self._begin_run,
             lambda: self.step_frames(1),
             self._after_fence,
-            self._send,
+            lambda now: self._send(now, self.period),
             lambda: self.sim.clocks.running,
             lambda: self._picture,
             self._print_wanted_status,

@@ -22,7 +22,6 @@ START = {
     "speed": "airspeed_mps", "on_ground": "on_ground",
 }  # fmt: skip
 _FAILURES = "sim/operation/failures/"
-_TRIMS = {"trim_roll": "aileron_trim", "trim_pitch": "elevator_trim", "trim_yaw": "rudder_trim"}
 _EXCITED = ("roll", "pitch", "yaw")
 _FAILED, _REPAIRED = 6.0, 0.0
 #: Systems as tx_node has them (lib/core/failures/failures.cpp): how many, and what fails with each.
@@ -81,7 +80,7 @@ class ScenarioPilot:
         """What the scenario wants at this flight time [s]."""
         commands = self.player.step(flight_time, sample_of(frame))
         handles = commands.handles
-        writes = [(f"sim/cockpit2/controls/{_TRIMS[name]}", value) for name, value in handles.items() if name in _TRIMS]
+        writes: List[Tuple[str, float]] = []
         for action in commands.actions:
             writes += self._writes(action)
         return PilotCommands(
@@ -89,6 +88,9 @@ class ScenarioPilot:
             pitch=commands.stick["pitch"],
             yaw=commands.stick["yaw"],
             throttle=commands.throttle,
+            trim_roll=handles.get("trim_roll"),
+            trim_pitch=handles.get("trim_pitch"),
+            trim_yaw=handles.get("trim_yaw"),
             flaps=handles.get("flaps"),
             gear_down=handles["gear"] >= 0.5 if "gear" in handles else None,
             speedbrake=handles.get("speedbrake"),

@@ -139,7 +139,7 @@ class Simulator:
         self.settings.set_weather(weather or Weather())
         self._bind_aircraft()
         self.traffic = Traffic(self.store, otherwise)
-        self.traffic.start(traffic, self.initial)
+        self.traffic.start(traffic, self.initial, self.home)
         if load_time <= 0.0:
             self.start_flight(self.initial)
         self.table.publish(self.frame, self.flying)
@@ -175,7 +175,7 @@ class Simulator:
                 self.inputs.read(self.controls, self.model, self.frame)
                 beam = Beam.heard(self.store) if self._autopilot.follows_radio() else None
                 altitude_ft = self.instruments.altitude_ft
-                self._autopilot.update(self.frame, altitude_ft, self.failed("rel_otto"), beam)
+                self._autopilot.update(self.failed("rel_otto"), beam)
                 self._servos.move(dt, self.frame, self.model.info, altitude_ft, self.controls, beam)
                 self._effects.apply(self.controls, self._failed, self.model, dt)
                 if not TRIM_FAILURES.isdisjoint(self._failed):
@@ -247,14 +247,19 @@ class Simulator:
         slots = slots[: self.model.info.engine_count]
         self.store.values[slots] = np.clip(self.store.values[slots] + step, 0.0, 1.0)
 
-    def run_engine(self, engine: int, running: bool) -> None:
-        """Starts or stops one engine."""
-        self.model.set_engine_running(engine, running)
+    def start_engine(self, engine: int) -> None:
+        """Starts one engine, at once, with its key turned."""
+        self.turn_key(engine, True)
+        self.model.set_engine_running(engine, True)
 
-    def run_engines(self, running: bool) -> None:
-        """Starts or stops all engines."""
+    def start_engines(self) -> None:
+        """Starts all engines."""
         for engine in range(self.model.info.engine_count):
-            self.model.set_engine_running(engine, running)
+            self.start_engine(engine)
+
+    def turn_key(self, engine: int, on: bool) -> None:
+        """Turns an engine's ignition key to both magnetos, or off."""
+        self.inputs.turn_key(engine, on)
 
     # --- flights, aircraft, situations --------------------------------------------------------------------------------
 

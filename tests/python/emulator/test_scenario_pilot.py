@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Iterator, List
 
 import pytest
 
 from support.room_table import ROOT
+from support.simulator.emulator_bench import row
+from support.simulator.emulator_fixture import EmulatorFixture
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.emulator import Emulator
 from xplane_bridge.emulator.options import parse
@@ -119,3 +122,59 @@ def test_a_scenario_may_start_on_the_ground(tmp_path: Path) -> None:
         emulator.close()
         assert emulator.sim.initial.on_ground is on_ground
         assert emulator.sim.initial.latitude_deg == 37.4602
+
+
+CONTROLS, OVERRIDE = "sim/cockpit2/controls/", "sim/operation/override/override_joystick"
+TRIM, FLAPS = CONTROLS + "elevator_trim", CONTROLS + "flap_ratio"
+THROTTLE = "sim/cockpit2/engine/actuators/throttle_ratio"
+
+
+@pytest.fixture(name="flown")
+def fixture_flown(tmp_path: Path) -> Iterator[EmulatorFixture]:
+    """The pilot sets handles at once, and another trim after a second."""
+    path = tmp_path / "handles.yaml"
+    path.write_text(
+        """
+name: handles
+events:
+  - {at: 0, stick: {throttle: 0.7}, handles: {trim_pitch: 0.1, flaps: 0.5}}
+  - {at: 1, handles: {trim_pitch: 0.3}}
+"""
+    )
+    with EmulatorFixture(aircraft="fixed_wing", pilot=path) as emulator:
+        emulator.step(2)
+        assert emulator.read(TRIM, FLAPS, THROTTLE) == pytest.approx([0.1, 0.5, 0.7])
+        yield emulator
+
+
+@pytest.mark.parametrize("overrides", [[""], ["_pitch", "_roll", "_heading"]])
+def test_the_pilot_leaves_trims_and_handles_to_who_takes_the_stick(
+    flown: EmulatorFixture, overrides: List[str]
+) -> None:
+    flown.write({**{OVERRIDE + each: 1.0 for each in overrides}, TRIM: -0.2, FLAPS: 0.0})
+    flown.step(90)
+    assert flown.read(TRIM, FLAPS) == pytest.approx([-0.2, 0.0])
+    flown.write({OVERRIDE + each: 0.0 for each in overrides})
+    assert flown.read(TRIM, FLAPS) == pytest.approx([0.3, 0.5])
+
+
+def test_the_pilot_leaves_a_trim_where_a_failure_has_moved_it(flown: EmulatorFixture) -> None:
+    runaway = "sim/operation/failures/rel_elv_trim_run"
+    flown.write({runaway: 6.0})
+    flown.step(20)
+    flown.write({runaway: 0.0})
+    (moved,) = flown.read(TRIM)
+    assert moved == pytest.approx(0.1 + 0.05 * 20 / 60, abs=0.002)
+    flown.step(5)
+    assert flown.read(TRIM) == [moved]
+
+
+def test_data_rows_hold_levers_and_handles_against_the_pilot(flown: EmulatorFixture) -> None:
+    client = flown.client()
+    for packet in (row(25, 0.2, 0.2), row(13, -0.4, -999.0, -999.0, 1.0)):
+        client.send(packet)
+    flown.step(90)
+    assert flown.read(THROTTLE, TRIM, FLAPS) == pytest.approx([0.2, -0.4, 1.0])
+    for index in (13, 25):
+        client.send(row(index))
+    assert flown.read(THROTTLE, TRIM, FLAPS) == pytest.approx([0.7, 0.3, 0.5])

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Callable, Dict, Optional, Protocol, Sequence
+from typing import Callable, Dict, Mapping, Optional, Protocol
 
-from xplane_bridge.emulator.datarefs.sources import LoadedAircraft
+from xplane_bridge.emulator.datarefs.sources import FlownAircraft
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.flight.frame import MPS_TO_FPM, MPS_TO_KT, Frame
 
@@ -21,7 +21,9 @@ CLIMB_DIAL, SPEED_DIAL, IS_MACH = AP + "vvi_dial_fpm", AP + "airspeed_dial_kts_m
 HELD_PITCH = AP + "sync_hold_pitch_deg"
 OFF, DIRECTOR, SERVOS = 0.0, 1.0, 2.0  #: of MASTER
 ARMED, CAPTURED = 1.0, 2.0
-_LATERAL, _VERTICAL = (ROLL, HEADING, NAV, APPROACH), (PITCH, CLIMB, ALTITUDE, SPEED, GLIDESLOPE)
+#: The modes of an axis: what `heading_mode` and `altitude_mode` show while one is captured.
+LATERAL = {ROLL: 0, HEADING: 1, NAV: 2, APPROACH: 2}
+VERTICAL = {PITCH: 3, CLIMB: 4, ALTITUDE: 6, SPEED: 5, GLIDESLOPE: 8}
 #: An armed altitude is captured so many seconds before it is reached, and at least so near [ft].
 _CAPTURE_S, _CAPTURE_FT = 6.0, 60.0
 #: An armed line is captured where its needle is off the stop, an armed path where it is near.
@@ -47,13 +49,12 @@ class Autopilot:
 
     Args:
         store: Has its datarefs.
-        sim: The loaded aircraft.
+        sim: The loaded aircraft and its flight.
     """
 
-    def __init__(self, store: DatarefStore, sim: LoadedAircraft) -> None:
+    def __init__(self, store: DatarefStore, sim: FlownAircraft) -> None:
         self._store = store
         self._sim = sim
-        self._altitude_ft = self._climb_fpm = self._speed_kt = self._pitch_deg = 0.0
 
     def commands(self) -> Dict[str, Callable[[], None]]:
         """What each of its commands does."""
@@ -64,11 +65,11 @@ class Autopilot:
             "servos_toggle": lambda: self._set(MASTER, DIRECTOR if self._get(MASTER) == SERVOS else SERVOS),
             "servos_off_any": lambda: self._set(MASTER, min(self._get(MASTER), DIRECTOR)),
             "servos_fdir_off": self.switch_off,
-            "wing_leveler": lambda: self._engage(_LATERAL, ROLL),
-            "heading": lambda: self._toggle(_LATERAL, HEADING, ROLL),
-            "vertical_speed": lambda: self._toggle(_VERTICAL, CLIMB, PITCH),
-            "level_change": lambda: self._toggle(_VERTICAL, SPEED, PITCH),
-            "altitude_hold": lambda: self._toggle(_VERTICAL, ALTITUDE, PITCH),
+            "wing_leveler": lambda: self._engage(LATERAL, ROLL),
+            "heading": lambda: self._toggle(LATERAL, HEADING, ROLL),
+            "vertical_speed": lambda: self._toggle(VERTICAL, CLIMB, PITCH),
+            "level_change": lambda: self._toggle(VERTICAL, SPEED, PITCH),
+            "altitude_hold": lambda: self._toggle(VERTICAL, ALTITUDE, PITCH),
             "altitude_arm": lambda: self._set(ALTITUDE_ARMED, float(not self._get(ALTITUDE_ARMED))),
             "NAV": lambda: self._arm_or_end(NAV),
             "approach": self._toggle_approach,
@@ -83,37 +84,35 @@ class Autopilot:
 
     def switch_off(self) -> None:
         """No flight director, no servos, no modes; dials, autothrottle and yaw damper stay."""
-        for name in (MASTER, *_LATERAL, *_VERTICAL, ALTITUDE_ARMED, GLIDESLOPE_ARMED):
+        for name in (MASTER, *LATERAL, *VERTICAL, ALTITUDE_ARMED, GLIDESLOPE_ARMED):
             self._set(name, OFF)
 
     def follows_radio(self) -> bool:
         """Whether a mode that goes by radio is armed or captured."""
         return self._sim.model.info.autopilot and any(self._get(name) for name in (NAV, APPROACH))
 
-    def update(self, frame: Frame, altitude_ft: float, failed: bool, needles: Optional[NeedlesShown]) -> None:
-        """A frame in flight: what engaging a mode finds, the modes it begins with, and what is captured.
+    def update(self, failed: bool, needles: Optional[NeedlesShown]) -> None:
+        """A frame in flight: the modes it begins with, and what is captured.
 
         Args:
-            frame: The present one.
-            altitude_ft: As indicated.
             failed: Whether it has failed.
             needles: Of the receiver that it follows; None where that hears no station.
         """
         if not self._sim.model.info.autopilot:
             return
-        self._altitude_ft, self._climb_fpm = altitude_ft, -frame.m.v_down_mps * MPS_TO_FPM
-        self._speed_kt, self._pitch_deg = frame.m.calibrated_airspeed_mps * MPS_TO_KT, frame.true_theta
         if failed:
-            self._set(MASTER, OFF)
+            self.switch_off()
+            self._set(AUTOTHROTTLE, OFF)
+            return
         self._follow(needles)
         if self._get(MASTER):
-            for group, basic in ((_LATERAL, ROLL), (_VERTICAL, PITCH)):
+            for group, basic in ((LATERAL, ROLL), (VERTICAL, PITCH)):
                 if not any(self._get(name) == CAPTURED for name in group):
                     self._engage(group, basic)
         if self._get(ALTITUDE_ARMED) and not self._get(ALTITUDE) and not self._get(GLIDESLOPE):
-            left = abs(self._get(ALTITUDE_DIAL) - altitude_ft)
-            if left < max(_CAPTURE_FT, abs(self._climb_fpm) / 60.0 * _CAPTURE_S):
-                self._engage(_VERTICAL, ALTITUDE)
+            left = abs(self._get(ALTITUDE_DIAL) - self._sim.instruments.altitude_ft)
+            if left < max(_CAPTURE_FT, abs(self._climb_fpm()) / 60.0 * _CAPTURE_S):
+                self._engage(VERTICAL, ALTITUDE)
                 self._set(HELD_FT, self._get(ALTITUDE_DIAL))
                 self._set(ALTITUDE_ARMED, OFF)
 
@@ -123,13 +122,16 @@ class Autopilot:
             if needles is None and self._get(name) == CAPTURED:
                 self._set(name, OFF)
             elif needles is not None and self._get(name) == ARMED and abs(needles.dots) < _LINE_DOTS:
-                self._engage(_LATERAL, name)
+                self._engage(LATERAL, name)
         path = None if needles is None else needles.path_dots
         if path is None or self._get(APPROACH) != CAPTURED:
             self._set(GLIDESLOPE, OFF)
         elif self._get(GLIDESLOPE_ARMED) and abs(path) < _PATH_DOTS:
-            self._engage(_VERTICAL, GLIDESLOPE)
+            self._engage(VERTICAL, GLIDESLOPE)
             self._set(GLIDESLOPE_ARMED, OFF)
+
+    def _climb_fpm(self) -> float:
+        return -self._sim.frame.m.v_down_mps * MPS_TO_FPM
 
     def _get(self, name: str) -> float:
         return self._store.get(name)
@@ -140,7 +142,7 @@ class Autopilot:
     def _if_there(self, action: Callable[[], None]) -> Callable[[], None]:
         return lambda: action() if self._sim.model.info.autopilot else None
 
-    def _toggle(self, group: Sequence[str], name: str, basic: str) -> None:
+    def _toggle(self, group: Mapping[str, int], name: str, basic: str) -> None:
         self._engage(group, basic if self._get(name) else name)
 
     def _arm_or_end(self, name: str) -> None:
@@ -150,19 +152,24 @@ class Autopilot:
         self._arm_or_end(APPROACH)
         self._set(GLIDESLOPE_ARMED, self._get(APPROACH))
 
-    def _engage(self, group: Sequence[str], name: str) -> None:
+    def _engage(self, group: Mapping[str, int], name: str) -> None:
         """A mode of a group; like X-Plane's, most turn their dial to what is flown. What is armed stays so."""
         for other in group:
             if other == name or self._get(other) != ARMED:
                 self._set(other, CAPTURED if other == name else OFF)
         if name == CLIMB:
-            self._set(CLIMB_DIAL, 100.0 * round(self._climb_fpm / 100.0))
+            self._set(CLIMB_DIAL, 100.0 * round(self._climb_fpm() / 100.0))
         elif name == SPEED and not self._get(IS_MACH):
-            self._set(SPEED_DIAL, round(self._speed_kt))
+            self._set(SPEED_DIAL, round(self._sim.frame.m.calibrated_airspeed_mps * MPS_TO_KT))
         elif name == ALTITUDE:
-            self._set(HELD_FT, self._altitude_ft)
+            self._set(HELD_FT, self._sim.instruments.altitude_ft)
         elif name == PITCH:
-            self._set(HELD_PITCH, self._pitch_deg)
+            self._set(HELD_PITCH, self._sim.frame.true_theta)
+
+
+def captured_mode(store: DatarefStore, group: Mapping[str, int]) -> int:
+    """The number of an axis's captured mode (`LATERAL`, `VERTICAL`); 0 where none is."""
+    return next((number for name, number in group.items() if store.get(name) == CAPTURED), 0)
 
 
 def dial_speed_kt(store: DatarefStore, frame: Frame) -> float:

@@ -71,8 +71,8 @@ def all_commands(sim: Actions) -> Dict[str, Callable[[], None]]:
         "sim/flight_controls/landing_gear_toggle": toggle(_COCKPIT + "gear_handle_down"),
         "sim/flight_controls/flaps_up": partial(_move_flaps, sim, -1),
         "sim/flight_controls/flaps_down": partial(_move_flaps, sim, 1),
-        "sim/flight_controls/speed_brakes_up_all": setter(_COCKPIT + "speedbrake_ratio", 1.0),
-        "sim/flight_controls/speed_brakes_down_all": setter(_COCKPIT + "speedbrake_ratio", 0.0),
+        "sim/flight_controls/speed_brakes_up_all": setter(_COCKPIT + "speedbrake_ratio", 0.0),  # retracts them
+        "sim/flight_controls/speed_brakes_down_all": setter(_COCKPIT + "speedbrake_ratio", 1.0),
         "sim/flight_controls/speed_brakes_toggle": toggle(_COCKPIT + "speedbrake_ratio"),
         "sim/flight_controls/brakes_toggle_max": toggle(_COCKPIT + "parking_brake_ratio"),
         "sim/flight_controls/brakes_toggle_regular": toggle(_COCKPIT + "parking_brake_ratio"),
@@ -84,10 +84,11 @@ def all_commands(sim: Actions) -> Dict[str, Callable[[], None]]:
         "sim/engines/throttle_up": lambda: sim.move_throttles(_THROTTLE_STEP),
         "sim/engines/throttle_down": lambda: sim.move_throttles(-_THROTTLE_STEP),
         "sim/engines/throttle_full": lambda: sim.move_throttles(1.0),
-        "sim/engines/engage_starters": lambda: sim.run_engines(True),
-        "sim/operation/auto_start": lambda: sim.run_engines(True),
-        "sim/operation/quick_start": lambda: sim.run_engines(True),
-        "sim/magnetos/magnetos_off": lambda: sim.run_engines(False),
+        "sim/engines/engage_starters": sim.start_engines,
+        "sim/operation/auto_start": sim.start_engines,
+        "sim/operation/quick_start": sim.start_engines,
+        "sim/magnetos/magnetos_off": lambda: _turn_keys(sim, False),
+        "sim/magnetos/magnetos_both": lambda: _turn_keys(sim, True),
     }
     for name, dataref in (
         ("lights/nav_lights", "navigation_lights_on"),
@@ -102,8 +103,9 @@ def all_commands(sim: Actions) -> Dict[str, Callable[[], None]]:
         table[f"sim/{name}_off"] = setter(switch, 0.0)
         table[f"sim/{name}_toggle"] = toggle(switch)
     for engine in range(sim.model.info.engine_count):
-        table[f"sim/starters/engage_starter_{engine + 1}"] = partial(sim.run_engine, engine, True)
-        table[f"sim/magnetos/magnetos_off_{engine + 1}"] = partial(sim.run_engine, engine, False)
+        table[f"sim/starters/engage_starter_{engine + 1}"] = partial(sim.start_engine, engine)
+        table[f"sim/magnetos/magnetos_off_{engine + 1}"] = partial(sim.turn_key, engine, False)
+        table[f"sim/magnetos/magnetos_both_{engine + 1}"] = partial(sim.turn_key, engine, True)
     if "glance-holds" not in sim.otherwise:
         for name, view in GLANCES.items():
             table[f"sim/view/{name}"] = partial(_look, sim, view, False)
@@ -126,6 +128,12 @@ def _move_flaps(sim: Actions, notches: int) -> None:
     if detents:
         notch = round(sim.store.get(_FLAPS) * detents) + notches
         sim.store.set(_FLAPS, min(max(notch, 0), detents) / detents)
+
+
+def _turn_keys(sim: Actions, on: bool) -> None:
+    """Turns the ignition keys of all engines."""
+    for engine in range(sim.model.info.engine_count):
+        sim.turn_key(engine, on)
 
 
 def _look(sim: Actions, view: int, external: bool) -> None:

@@ -46,7 +46,7 @@ _HANDLES = {
     (14, 2): (_COCKPIT + "left_brake_ratio", 0.0, 1.0),
     (14, 3): (_COCKPIT + "right_brake_ratio", 0.0, 1.0),
 }
-_THROTTLE_ROW = 25
+_THROTTLE_ROW, _TRIM_ROW = 25, 13
 #: Rudder that auto-coordination gives for sideslip (wind from the right positive: the nose goes right).
 _COORDINATION_PER_DEG = 0.1
 _TRIMS = (_COCKPIT + "elevator_trim", _COCKPIT + "aileron_trim", _COCKPIT + "rudder_trim")
@@ -68,7 +68,8 @@ _READ_HANDLES = (
     _OVERRIDE + "toe_brakes",
     _OVERRIDE + "artstab",
 )
-#: 0 is off; every other position lets an engine run.
+#: Positions of the key: off and both magnetos; every other one lets an engine run as well.
+_KEY_OFF, _KEY_BOTH = 0.0, 3.0
 _IGNITION_KEY, _FUEL_SELECTOR = _ACTUATORS + "ignition_key", "sim/cockpit2/fuel/fuel_tank_selector"
 #: Levers, handles and switches that a saved situation brings back and a new flight sets.
 _LEVERS = (
@@ -100,6 +101,9 @@ class PilotCommands:
     pitch: float = 0.0  #: -1..1, nose up +
     yaw: float = 0.0  #: -1..1, nose right +
     throttle: Optional[float] = None  #: all levers, 0..1
+    trim_roll: Optional[float] = None  #: trims are moved when they change
+    trim_pitch: Optional[float] = None
+    trim_yaw: Optional[float] = None
     flaps: Optional[float] = None
     gear_down: Optional[bool] = None
     speedbrake: Optional[float] = None
@@ -124,7 +128,7 @@ class ControlInputs:
 
     The order of power on the stick: a DATA row that holds it, `override_joystick` (what was written to the yoke
     datarefs stays, pedals and auto-coordination included), the pilot, auto-coordination, and last the centred stick.
-    Levers stay where they were put last.
+    Levers stay where they were put last; a DATA row that holds one does so against the pilot, too.
     """
 
     def __init__(self, store: DatarefStore, pilot: Optional[Pilot], options: InputOptions) -> None:
@@ -138,6 +142,7 @@ class ControlInputs:
         self._same_surface: Dict[int, int] = {}
         self._joystick_slots = np.zeros(0, dtype=int)
         self._handles: Callable[[], List[float]] = list  # as connect() makes it
+        self._pilot_trims: Dict[str, float] = {}  # as the pilot has set them last in this flight
         self._fuel_on = 0.0  # position of the fuel selector, where a flight begins
 
     # --- definition ---------------------------------------------------------------------------------------------------
@@ -195,6 +200,7 @@ class ControlInputs:
             set_first(self._store, _ACTUATORS + name, values[:engines], engines)
         reset_switches(self._store, engines)
         self._store.set(_FUEL_SELECTOR, self._fuel_on)
+        self._pilot_trims.clear()
         for name, value in (
             (_COCKPIT + "elevator_trim", controls.trim_pitch),
             (_COCKPIT + "aileron_trim", controls.trim_roll),
@@ -221,6 +227,10 @@ class ControlInputs:
         for name, value in zip(_TRIMS, (controls.trim_pitch, controls.trim_roll, controls.trim_yaw)):
             self._store.set(name, value)
 
+    def turn_key(self, engine: int, on: bool) -> None:
+        """Turns an engine's ignition key to both magnetos, or off."""
+        self._store.values[self._store.locate(_IGNITION_KEY, engine)] = _KEY_BOTH if on else _KEY_OFF
+
     # --- DATA rows ----------------------------------------------------------------------------------------------------
 
     def take_row(self, row: int, slots: Sequence[float]) -> None:
@@ -245,7 +255,6 @@ class ControlInputs:
     def read(self, controls: Controls, model: FlightModel, frame: Frame) -> None:
         """Sets `controls` for this frame."""
         store = self._store
-        self._apply_held()
         joystick = self._overrides("joystick") or self._overrides("flightcontrol")
         commands: Optional[PilotCommands] = None
         if self._pilot is not None:
@@ -256,6 +265,7 @@ class ControlInputs:
             # Who takes an axis flies: the pilot lets go of levers and handles, too.
             if not joystick and not any(self._overrides("joystick_" + axis) for axis, _attribute, _slot in _AXES):
                 self._move_handles(commands, model)
+        self._apply_held()
         for axis, attribute, slot in _AXES:
             name = f"sim/joystick/yoke_{axis}_ratio"
             held = self._held.get((8, slot), self._held.get((11, slot)))
@@ -324,6 +334,11 @@ class ControlInputs:
         ):
             if value is not None:
                 store.set(_COCKPIT + name, float(value))
+        # On change only: what a failure or a client has moved since then stays.
+        for slot, (name, trim) in enumerate(zip(_TRIMS, (commands.trim_pitch, commands.trim_roll, commands.trim_yaw))):
+            if trim is not None and self._pilot_trims.get(name) != trim and (_TRIM_ROW, slot) not in self._held:
+                self._pilot_trims[name] = trim
+                store.set(name, trim)
 
     def _read_handles(self, controls: Controls) -> None:
         (

@@ -10,13 +10,20 @@ from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.datarefs.traffic import Traffic
 from xplane_bridge.emulator.datarefs.world_settings import WorldSettings
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, InitialState
-from xplane_bridge.emulator.flight.frame import Clocks
+from xplane_bridge.emulator.flight.frame import Clocks, Frame
 
 
 class LoadedAircraft(Protocol):
     """Which aircraft is loaded."""
 
     model: FlightModel  #: another object after another aircraft was loaded
+
+
+class FlownAircraft(LoadedAircraft, Protocol):
+    """What it does and shows at present. Objects may be replaced: ask anew each time."""
+
+    frame: Frame
+    instruments: Instruments
 
 
 class Sources(LoadedAircraft, Protocol):
@@ -76,8 +83,11 @@ class Actions(LoadedAircraft, Protocol):
     def move_throttles(self, step: float) -> None:
         """Moves all levers by `step`, within 0..1."""
 
-    def run_engine(self, engine: int, running: bool) -> None:
-        """Starts or stops one engine."""
+    def start_engine(self, engine: int) -> None:
+        """Starts one engine, at once, with its key turned."""
 
-    def run_engines(self, running: bool) -> None:
-        """Starts or stops all engines."""
+    def start_engines(self) -> None:
+        """Starts all engines."""
+
+    def turn_key(self, engine: int, on: bool) -> None:
+        """Turns an engine's ignition key to both magnetos, or off."""

@@ -66,13 +66,20 @@ class Traffic:
             for leaf in (*WRITTEN, *GEODETIC):
                 store.on_write(PLANE.format(number) + leaf, partial(self._forget, number))
 
-    def start(self, count: int, initial: InitialState) -> None:
-        """`count` aircraft that the emulator flies, ahead of where a flight starts; with none, one is parked there."""
-        turn = math.radians(initial.heading_deg)
+    def start(self, count: int, initial: InitialState, home: InitialState) -> None:
+        """`count` aircraft that the emulator flies, ahead of `initial`; with none, one is parked beside the runway.
+
+        Args:
+            count: How many.
+            initial: Where flights start.
+            home: A flight over the middle of the runway, along it.
+        """
         if count == 0:
+            turn = math.radians(home.heading_deg)
             offset = (-_PARKED_RIGHT_M * math.sin(turn), _PARKED_RIGHT_M * math.cos(turn))
-            place = moved(initial.latitude_deg, initial.longitude_deg, *offset)
-            self.aircraft[1] = OtherAircraft(*place, initial.terrain_elevation_m, heading_deg=initial.heading_deg)
+            place = moved(home.latitude_deg, home.longitude_deg, *offset)
+            self.aircraft[1] = OtherAircraft(*place, home.terrain_elevation_m, heading_deg=home.heading_deg)
+        turn = math.radians(initial.heading_deg)
         for number in range(1, count + 1):
             ahead, right = _AHEAD_M + _APART_M * number, 0.5 * _APART_M * number
             north = ahead * math.cos(turn) - right * math.sin(turn)

@@ -36,6 +36,7 @@ class SurfaceActuator:
         """Moves at once, as a write to X-Plane's dataref does, beyond the stops too."""
         self.position_deg = position_deg
         self.effective_deg = position_deg
+        self._stuck_deg = None
 
     def step(self, target_deg: float, dt: float) -> None:
         """The healthy surface on its way to where the controls want it."""

@@ -89,10 +89,7 @@ class FailureEffects:
             controls.flap_request = self._frozen.setdefault("flap_request", model.state.flap_ratio)
         else:
             self._frozen.pop("flap_request", None)
-        if "rel_lbrakes" in failed:
-            controls.brake_left = 0.0
-        if "rel_rbrakes" in failed:
-            controls.brake_right = 0.0
+        self._fail_brakes(controls, failed)
         for i in range(engines):
             if "rel_throt_lo" in failed:
                 controls.throttle[i] = 0.0
@@ -118,6 +115,17 @@ class FailureEffects:
             setattr(controls, attribute, self._frozen.setdefault(attribute, getattr(controls, attribute)))
         else:
             self._frozen.pop(attribute, None)
+
+    @staticmethod
+    def _fail_brakes(controls: Controls, failed: Set[str]) -> None:
+        """A side that has failed brakes neither by its pedal nor by the parking brake, which the other side keeps."""
+        sides = (("rel_lbrakes", "brake_left"), ("rel_rbrakes", "brake_right"))
+        if not any(leaf in failed for leaf, _ in sides):
+            return
+        for leaf, pedal in sides:
+            force = 0.0 if leaf in failed else max(getattr(controls, pedal), controls.parking_brake)
+            setattr(controls, pedal, force)
+        controls.parking_brake = 0.0
 
     @staticmethod
     def _limit_stick(controls: Controls, failed: Set[str]) -> None:

@@ -323,6 +323,7 @@ class ModelInfo:
     max_throttle: float = 1.0
     min_throttle: float = 0.0  #: < 0 where the engine reverses
     hover_thrust_vector: Optional[float] = None  #: tiltrotor only
+    maximum_mass_kg: float = 0.0  #: full tanks and all the payload that it carries
     maximum_power_w: float = 0.0  #: per engine
     maximum_rpm: float = 0.0
     never_exceed_mps: float = 0.0  #: indicated

@@ -188,6 +188,32 @@ def test_vertical_speed_begins_with_what_is_flown(emulator):
     assert shown(emulator, "vvi_dial_fpm") == [0.0]
 
 
+def test_a_mode_after_a_placement_takes_what_the_new_flight_has(emulator):
+    fly(emulator, 1)
+    emulator.sim.pause(True)
+    emulator.client().send(protocol.Placement(6, latitude_deg=47.5, elevation_m=2500.0, speed_mps=80.0))
+    press(emulator, "servos_on", "altitude_hold")
+    (held,) = shown(emulator, "altitude_hold_ft")
+    assert held == pytest.approx(2500.0 / 0.3048, abs=20.0)
+    press(emulator, "level_change")
+    assert shown(emulator, "airspeed_dial_kts_mach") == [round(emulator.sim.instruments.airspeed_kt)]
+
+
+def test_captured_modes_have_x_planes_numbers(emulator):
+    assert shown(emulator, "heading_mode", "altitude_mode") == [0.0, 0.0]
+    press(emulator, "servos_on")
+    assert shown(emulator, "heading_mode", "altitude_mode") == [0.0, 3.0]
+    for command, number in (("vertical_speed", 4.0), ("level_change", 5.0), ("altitude_hold", 6.0)):
+        press(emulator, command)
+        assert shown(emulator, "altitude_mode") == [number]
+    press(emulator, "heading", "approach")
+    assert shown(emulator, "heading_mode", "altitude_mode") == [1.0, 6.0], "an armed line is not flown yet"
+    tune(emulator, 110300, 0.0)
+    press(emulator, "approach", "NAV")
+    emulator.step()
+    assert shown(emulator, "nav_status", "heading_mode") == [2.0, 2.0]
+
+
 def test_it_moves_nothing_without_servos_and_where_a_client_has_the_axis(emulator):
     dials(emulator, heading_dial_deg_mag_pilot=(heading(emulator) + 90.0) % 360.0)
     press(emulator, "fdir_on", "heading")
@@ -220,10 +246,17 @@ def test_yaw_damper_takes_the_swing_out_of_a_kick(emulator):
 
 
 def test_a_failed_autopilot_lets_go(emulator):
-    press(emulator, "servos_on")
+    dials(emulator, airspeed_dial_kts_mach=180.0)
+    press(emulator, "servos_on", "heading", "autothrottle_on", "altitude_arm")
     emulator.write({"sim/operation/failures/rel_otto": 6.0})
     emulator.step(2)
-    assert shown(emulator, "flight_director_mode") == [0.0]
+    modes = ("flight_director_mode", "heading_status", "pitch_status", "altitude_hold_armed", "autothrottle_enabled")
+    assert shown(emulator, *modes) == [0.0] * 5
+    levers = list(emulator.sim.controls.throttle)
+    press(emulator, "servos_on", "autothrottle_on")
+    fly(emulator, 1)
+    assert shown(emulator, *modes) == [0.0] * 5
+    assert emulator.sim.controls.throttle == levers
 
 
 def test_a_new_flight_begins_without_it(emulator):

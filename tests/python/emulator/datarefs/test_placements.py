@@ -15,6 +15,7 @@ from support.simulator.emulator_bench import (
     row,
 )
 from xplane_bridge import protocol
+from xplane_bridge.emulator.aircraft import model_names
 from xplane_bridge.emulator.flight.flight_model import InitialState
 from xplane_bridge.emulator.simulator import aircraft_path
 
@@ -111,6 +112,15 @@ def test_loading_is_shown_while_the_flight_stands(bench):
     emulator.write({weight + "m_fuel[0]": 60.0, weight + "m_fixed": 300.0})
     shown = emulator.read(weight + "m_fuel[0]", weight + "m_fixed", weight + "m_total")
     assert shown == pytest.approx([60.0, 300.0, before - 40.0 + 90.0], abs=0.1)
+
+
+@pytest.mark.parametrize("aircraft", model_names())
+def test_the_highest_mass_is_that_of_full_tanks_and_all_payload(bench, aircraft):
+    emulator = bench(aircraft=aircraft)
+    model = emulator.sim.model
+    model.set_loading(fuel_kg=model.fuel_capacity_kg, payload_kg=model.max_payload_kg)
+    most, mass = emulator.read("sim/aircraft/weight/acf_m_max", "sim/flightmodel/weight/m_total")
+    assert most == pytest.approx(mass, rel=1e-4)
 
 
 def test_a_refused_tank_leaves_the_others_theirs(bench):

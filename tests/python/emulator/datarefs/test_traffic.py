@@ -45,6 +45,15 @@ def test_one_stands_on_the_apron_where_none_flies(bench):
     assert pose(emulator, 2) == pytest.approx([0.0] * 9), "there is no second one"
 
 
+def test_the_apron_is_where_the_aerodrome_is(bench):
+    emulator = bench(aerodrome=(37.0, 126.0, 90.0))
+    emulator.step()
+    other = emulator.sim.traffic.aircraft[1]
+    # Heading east: 215 m south. One degree of latitude is R * pi / 180 = 111317 m.
+    assert (other.latitude_deg, other.longitude_deg) == pytest.approx((37.0 - 215.0 / 111317.0, 126.0), abs=1e-6)
+    assert other.heading_deg == 90.0
+
+
 def test_those_that_fly_go_straight_on_as_they_show(bench):
     emulator = bench(traffic=2)
     emulator.step(2)

@@ -86,6 +86,18 @@ def test_rref_rates_that_do_not_divide_the_frame_rate_keep_their_average(bench):
     assert len(client.received()) == pytest.approx(250, abs=1)
 
 
+def test_rates_keep_their_average_where_frames_are_slower_than_asked_for(bench):
+    emulator = bench(fps=60.0)
+    client, mover, display = emulator.client(), emulator.client(), emulator.client()
+    client.subscribe([TIME], rate_hz=20)
+    mover.send(protocol.RposRequest(20))
+    display.send(protocol.NetworkTarget(protocol.DATA_OUTPUT_TARGET, *display.socket.getsockname(), enabled=True))
+    display.send(protocol.RowSelection("DSEL", (1,)))
+    for frame in range(250):
+        emulator.emulator.run_frame(0.04, frame * 0.04)  # 25 a second
+    assert [len(each.received()) for each in (client, mover, display)] == [pytest.approx(200, abs=1)] * 3
+
+
 def test_rref_joins_rates_that_are_due_together(bench):
     emulator = bench(fps=60.0)
     client = emulator.client()

@@ -66,6 +66,7 @@ class FixedWing(JsbsimModel):
         retractable_gear=True,
         autopilot=True,
         flap_detents=3,
+        maximum_mass_kg=2340.0,
         maximum_power_w=ENGINE.rated_power_w,
         maximum_rpm=ENGINE.rated_rpm,
         never_exceed_mps=105.0,

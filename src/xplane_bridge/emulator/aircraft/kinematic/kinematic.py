@@ -66,6 +66,7 @@ class KinematicModel:
         gear_names=("nose", "left", "right"),
         retractable_gear=True,
         flap_detents=4,
+        maximum_mass_kg=1500.0,
         maximum_power_w=_MAX_POWER_W,
         maximum_rpm=_MAX_RPM,
         never_exceed_mps=120.0,

@@ -74,6 +74,7 @@ class Multirotor(JsbsimModel):
         tank_count=0,
         gear_names=("front_left", "front_right", "rear_left", "rear_right"),
         retractable_gear=False,
+        maximum_mass_kg=1.207,
         maximum_power_w=MAXIMUM_POWER_W,
         maximum_rpm=MAXIMUM_OMEGA * 30.0 / math.pi,
         never_exceed_mps=20.0,

@@ -93,6 +93,7 @@ class Tiltrotor(JsbsimModel):
         retractable_gear=True,
         flap_detents=1,
         hover_thrust_vector=HOVER_RATIO,
+        maximum_mass_kg=1170.0,
         maximum_power_w=ENGINE_POWER_W,
         maximum_rpm=HOVER_OMEGA * 30.0 / math.pi,
         never_exceed_mps=115.0,

@@ -124,7 +124,6 @@ def _surfaces(t: Table, sim: Sources) -> None:
     for name in WING_ELEVATORS:
         t.setting(name)
         sim.watch_surface(name)
-    t.setting("_emulator/no_surface")
     for leaf, name in _ARRAYS.items():
         array = f"sim/flightmodel2/wing/{name}"
         if single[leaf]:
@@ -149,8 +148,9 @@ def _surfaces(t: Table, sim: Sources) -> None:
 
 def _padded(store: DatarefStore, array: str, names: List[str], start: int) -> List[str]:
     """The elements of an array of X-Plane's that shows these datarefs from its element `start` on."""
-    nothing = "_emulator/no_surface"
-    return [nothing] * start + names + [nothing] * (store.elements(array) - start - len(names))
+    rest = store.add(f"_emulator/no_surface/{array}", size=store.elements(array) - len(names))
+    nothing = [f"{rest.name}[{index}]" for index in range(len(rest.slots))]
+    return nothing[:start] + names + nothing[start:]
 
 
 def old_names(surfaces: Sequence[SurfaceSpec]) -> Dict[str, str]:

@@ -168,15 +168,11 @@ def _weights(t: Table, sim: Sources) -> None:
     t.setting(weight + "m_jettison")
     per_kg = 1.0 / 0.45359237 if "mass-unit" in sim.otherwise else 1.0
     t.value("sim/aircraft/weight/acf_m_empty", lambda f: per_kg * f.m.empty_mass_kg)
-    t.value("sim/aircraft/weight/acf_m_max", lambda f: per_kg * _maximum_mass(f))
+    t.value("sim/aircraft/weight/acf_m_max", lambda f: per_kg * f.info.maximum_mass_kg)
     # the list of 12.08 marks the old name as replaced
     # without fuel, whose tanks are at the reference point
     t.value("sim/flightmodel/misc/cgz_ref_to_default", lambda f: -f.m.cg_forward_m * f.m.mass_kg / f.m.dry_mass_kg)
     t.value("sim/flightmodel2/misc/cg_offset_z", lambda f: -f.m.cg_forward_m)
-
-
-def _maximum_mass(f: Frame) -> float:
-    return 1.15 * f.m.mass_kg if f.m.empty_mass_kg == 0 else round(1.5 * f.m.empty_mass_kg, -1)
 
 
 def _time(t: Table, sim: Sources) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Iterable, List
 
+from xplane_bridge.emulator.datarefs.autopilot import LATERAL, VERTICAL, captured_mode
 from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.tables.base import Table
 from xplane_bridge.emulator.flight.frame import Frame
@@ -109,8 +110,6 @@ def _autopilot(t: Table, sim: Sources) -> None:
         "flight_director_mode",
         "autothrottle_enabled",
         "autothrottle_on",
-        "heading_mode",
-        "altitude_mode",
         "nav_status",
         "heading_status",
         "altitude_hold_status",
@@ -126,6 +125,8 @@ def _autopilot(t: Table, sim: Sources) -> None:
         "glideslope_armed",
     ):
         t.setting(_AUTOPILOT + name)
+    t.value(_AUTOPILOT + "heading_mode", lambda _: captured_mode(sim.store, LATERAL))
+    t.value(_AUTOPILOT + "altitude_mode", lambda _: captured_mode(sim.store, VERTICAL))
     t.setting(_AUTOPILOT + "autopilot_electric_master", 1.0)
     t.value(_AUTOPILOT + "servos_on", lambda _: sim.store.get(_AUTOPILOT + "flight_director_mode") == 2.0)
     for name in (
