@@ -74,7 +74,7 @@ def test_a_change_that_is_never_reported_has_failed(monkeypatch: pytest.MonkeyPa
     assert found.pending(), "it began when the one before it had ended"
     now[0] += 2.0
     assert not found.pending()
-    assert failed == [(1.0, "weather: tx_node has not reported event 4 within 150 s: see if it still runs")]
+    assert failed == [(1.0, "weather: tx_node has not reported event 4 within 150 s: see whether it still runs")]
 
 
 def test_a_change_of_a_tx_node_that_was_started_anew_has_failed() -> None:
