@@ -70,7 +70,7 @@ class VirtualStick:
             for kind, value in event.actions:
                 if kind == "buttons":
                     numbers = [number for given in value.values() for number in given]
-                    self._button_count = max(self._button_count, max(numbers) + 1)
+                    self._button_count = max([self._button_count, *(number + 1 for number in numbers)])
 
     def mode_button(self, mode: str, present: str) -> Optional[int]:
         """The button that asks for a mode; None when nothing has to be pressed.

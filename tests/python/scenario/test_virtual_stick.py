@@ -158,6 +158,7 @@ def test_there_are_the_buttons_that_a_scenario_presses():
     stick = VirtualStick(device(LEVER))
     assert len(stick.joy(Commands())[1]) == 12
     events = [{"at": 0, "buttons": {"press": [12, 3]}}, {"at": 1, "label": "a", "buttons": {"tap": 40}}]
+    events.append({"at": 2, "buttons": {}})
     stick.provide_buttons(parse_scenario({"name": "test", "events": events}))
     assert stick.joy(Commands(buttons={12}))[1] == [0] * 12 + [1] + [0] * 28
 
