@@ -15,7 +15,7 @@ from xplane_bridge.emulator.scenario_pilot import START
 from xplane_bridge.errors import is_number
 from xplane_bridge.gym.errors import GymError
 from xplane_bridge.in_process.aircraft import AUTO, LOADING, WEATHER, Conditions
-from xplane_bridge.in_process.failures import Failures, NotFlownError
+from xplane_bridge.in_process.failures import WITH_VALUE, Failures, NotFlownError
 
 ATTITUDE = ("roll", "pitch")
 #: What can be given, in the order in which it is drawn.
@@ -24,8 +24,6 @@ _ACTION_KEYS = ("name", "kind", "value")
 _FAILURE_KEYS = (*_ACTION_KEYS, "at")
 #: Shares drawn for a failure: of its name, kind, value and time.
 _FAILURE_SHARES = len(_FAILURE_KEYS)
-#: Kinds of failure that take a value.
-_WITH_VALUE = ("stuck", "reduced", "slow")
 _MOST_SEED = 2**31
 #: What a steady flight hangs on; where the aircraft stands over the ground also the wind against it.
 _TRIMMED = ("on_ground", "altitude", "speed", "temperature_offset", "sea_level_pressure", *LOADING)
@@ -111,7 +109,7 @@ def _failure(index: int, item: Any) -> Dict[str, Any]:
 
 def _action(item: Mapping[str, Any], name: str, kind: str, value: Optional[float]) -> Dict[str, Any]:
     """A scenario's `failure`; beside a drawn kind, a value is for those that take one."""
-    if isinstance(item["kind"], Parameter) and kind not in _WITH_VALUE:
+    if isinstance(item["kind"], Parameter) and kind not in WITH_VALUE:
         value = None
     return {"name": name, "kind": kind, "value": value, "clear": False}
 

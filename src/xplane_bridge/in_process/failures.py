@@ -19,6 +19,8 @@ from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.surfaces import SURFACES
 
 _MOST_STUCK_DEG = 90.0
+#: Kinds of a surface's failure that take a value.
+WITH_VALUE = ("stuck", "reduced", "slow")
 #: Systems whose failure does not reach the flight model: they change what instruments and busses show.
 _NOT_FLOWN = re.compile(r"rel_(esys|genera|batter|pitot|static|ss_|cop_)")
 

@@ -49,7 +49,8 @@ _HANDLES = {
 _THROTTLE_ROW, _TRIM_ROW = 25, 13
 #: Rudder that auto-coordination gives for sideslip (wind from the right positive: the nose goes right).
 _COORDINATION_PER_DEG = 0.1
-_TRIMS = (_COCKPIT + "elevator_trim", _COCKPIT + "aileron_trim", _COCKPIT + "rudder_trim")
+#: Elevator, aileron and rudder: by slot of the row that holds them.
+_TRIMS = tuple(_HANDLES[_TRIM_ROW, slot][0] for slot in range(3))
 _HANDLE_NAMES = (
     *_TRIMS,
     _COCKPIT + "flap_ratio",
