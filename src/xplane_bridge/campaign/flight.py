@@ -26,11 +26,8 @@ from xplane_bridge.scenario.stall_warnings import awaits_stall
 FLOWN, NO_START, GAVE_UP, CRASHED, UNFINISHED, CONTROLLER_FAILED = (
     "flown", "no start", "model gave up", "crashed", "not finished", "controller failed",
 )  # fmt: skip
-#: Scenario variables that criteria measure, in the order in which `_measured` gives them.
-_VARIABLES = (
-    "roll", "pitch", "heading", "altitude", "agl", "climb", "speed", "alpha", "beta", "roll_rate", "pitch_rate",
-    "yaw_rate", "load_factor",
-)  # fmt: skip
+#: Scenario variables that criteria measure: the first ones of a sample.
+_VARIABLES = FlightSample._fields[: FlightSample._fields.index("load_factor") + 1]
 _STICK = ("stick_roll", "stick_pitch", "stick_yaw", "throttle")
 
 
@@ -143,7 +140,8 @@ class Flight:
             commands = self._player.step(aircraft.shown_time, sample)
             if now >= self._plan.longest and not commands.finished:
                 return UNFINISHED, f"the scenario has not ended after {self._plan.longest:g} s (longest)"
-            self._go_on_exciting(view)
+            if self._excitation is not None:
+                self._go_on_exciting(*self._excitation, view)
             for action in commands.actions:
                 self._act(action.kind, action.value, now, view)
             if commands.finished:  # with what its last event asked for, as the other players do it
@@ -179,19 +177,16 @@ class Flight:
         if refusal is not None:
             raise _RefusedError(f"command refused: {refusal}")
 
-    def _go_on_exciting(self, view: FlightView) -> None:
+    def _go_on_exciting(self, target: str, runner: Any, view: FlightView) -> None:
         """The excitation of this frame: the channel that it moves, and by how much."""
-        self._moved = (None, 0.0)
-        if self._excitation is not None:
-            target, runner = self._excitation
-            value = runner.step(view.sim_time, view.roll_deg, view.pitch_deg)
-            if value is None:
-                self._excitation = None
-            else:
-                self._moved = (target, value)
+        value = runner.step(view.sim_time, view.roll_deg, view.pitch_deg)
+        if value is None:
+            self._end_excitation()
+        else:
+            self._moved = (target, value)
 
     def _end_excitation(self) -> None:
-        """As a change of the mode does it, or the end of the axis's commands."""
+        """It is over; or the mode has changed, or the axis's commands have ended."""
         self._excitation, self._moved = None, (None, 0.0)
 
     def _excite(self, parameters: Mapping[str, Any], view: FlightView) -> None:
@@ -231,10 +226,7 @@ class Flight:
     def _record(self, now: float, state: ModelState, s: FlightSample) -> None:
         self._truth.update(self._truth_bytes(state))
         c = self._aircraft.controls
-        self._rows.append((
-            now, s.roll, s.pitch, s.heading, s.altitude, s.agl, s.climb, s.speed, s.alpha, s.beta, s.roll_rate,
-            s.pitch_rate, s.yaw_rate, s.load_factor, c.roll, c.pitch, c.yaw, c.throttle[0],
-        ))  # fmt: skip
+        self._rows.append((now, *s[: len(_VARIABLES)], c.roll, c.pitch, c.yaw, c.throttle[0]))
 
 
 def conditions_of(plan: FlightPlan) -> Conditions:

@@ -111,7 +111,7 @@ class Aircraft:
     def __init__(self, conditions: Conditions) -> None:
         arbiter = require("a flight in process").ControlArbiter
         self.period = 1.0 / conditions.frame_rate  #: [s] of a frame
-        self._shown_period = struct.unpack("<f", struct.pack("<f", self.period))[0]  # as X-Plane sends it
+        self._shown_period: float = struct.unpack("<f", struct.pack("<f", self.period))[0]  # as X-Plane sends it
         self.frame = 0
         self.model = conditions.model()
         #: As commanded: what has failed may let something else through.
@@ -136,11 +136,11 @@ class Aircraft:
     @property
     def shown_time(self) -> float:
         """The same as the bridge's states show it [s]: by the frame's period in float32."""
-        return float(self.frame * self._shown_period)
+        return self.frame * self._shown_period
 
     def _clock(self) -> float:
         """[s] as tx_node has it in lock-step: to the microsecond, rounded as seconds beside a large number are."""
-        return (_CLOCK_NS + round(self.now * 1e6) * 1000) / 1e9
+        return (_CLOCK_NS + round(self.frame * self.period * 1e6) * 1000) / 1e9
 
     @property
     def state(self) -> ModelState:
@@ -150,7 +150,8 @@ class Aircraft:
     @property
     def mode(self) -> int:
         """MANUAL or AUTO."""
-        return int(self._arbiter.mode)
+        mode: int = self._arbiter.mode
+        return mode
 
     def view(self) -> FlightView:
         """What a controller sees of this frame."""
@@ -172,7 +173,8 @@ class Aircraft:
 
     def commands(self, axis: str) -> bool:
         """Whether what flies commands roll, pitch, yaw or throttle, as of the last command or step."""
-        return bool(self._arbiter.commands(axis))
+        flown: bool = self._arbiter.commands(axis)
+        return flown
 
     def command(self, mode: int, values: Mapping[str, Any]) -> Optional[str]:
         """A command on control/manual or control/auto, answering this frame; why it is refused, or None."""

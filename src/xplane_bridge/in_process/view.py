@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 from xplane_bridge.compiled import require
 from xplane_bridge.emulator.flight.earth import LocalFrame
 from xplane_bridge.emulator.flight.flight_model import Controls, ModelInfo, ModelState
 from xplane_bridge.emulator.flight.frame import PARKED_HEIGHT_M
+
+
+@lru_cache(maxsize=1)  # each frame asks
+def _flight_numbers() -> Any:
+    return require("a flight in process").flight_numbers
 
 
 class Vector3(NamedTuple):
@@ -93,9 +99,7 @@ class FlightView(_Numbers):
     ) -> FlightView:
         """That of a state, `frame` frames of `period` [s] after the start, in the scenery of `origin`."""
         heights = info.standing_height_m, PARKED_HEIGHT_M
-        numbers = require("a flight in process").flight_numbers(
-            state, controls, period, *heights, origin.lat_ref, origin.lon_ref
-        )
+        numbers = _flight_numbers()(state, controls, period, *heights, origin.lat_ref, origin.lon_ref)
         self = tuple.__new__(cls, numbers)
         self.frame_count = frame
         self.on_ground, self.stall_warning = state.on_ground_any, state.stall_warning

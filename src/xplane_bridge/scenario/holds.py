@@ -59,6 +59,10 @@ class Targets:
         for key, value in changes.items():
             setattr(self, key, value)
 
+    def any(self) -> bool:
+        """Whether anything is to be held."""
+        return any(value is not None for value in vars(self).values())
+
 
 class HoldAutopilot:
     """Flies `Targets`. Stateful: integrators, which start from the stick in use so that taking over is smooth.
@@ -71,6 +75,10 @@ class HoldAutopilot:
         self._pitch_integral: Optional[float] = None
         self._climb_integral: Optional[float] = None
         self._throttle_integral: Optional[float] = None
+
+    def let_go(self) -> None:
+        """As for targets of which none holds anything."""
+        self._climb_integral = self._pitch_integral = self._throttle_integral = None
 
     def roll(self, targets: Targets, roll_deg: float, roll_rate_dps: float, heading_deg: float) -> Optional[float]:
         """Stick, right +; None if nothing is to be held."""

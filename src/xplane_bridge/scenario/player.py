@@ -89,13 +89,16 @@ class Player:
         self.targets = Targets()
         self._apply_excitations = apply_excitations
         self._autopilot = HoldAutopilot(dataclasses.replace(HoldGains(), **scenario.gains))
-        self._axes: Dict[str, _Ramp] = {}
+        self._moving: Dict[str, _Ramp] = {}  # stick movements under way
+        self._moved: Dict[str, float] = {}  # where each axis is by its last one
+        self._holding = False  # any of the targets
         self._handles: Dict[str, float] = {}
         self._buttons: Set[int] = set()
         self._taps: Set[int] = set()
         self._running: List[Tuple[float, Mapping[str, Any]]] = []
         self._held_back: List[Mapping[str, Any]] = []  # excitations, until there is a command that they are added to
         self._next = 0
+        self._quiet_until = -math.inf  # no event before this time
         self._start: Optional[float] = None
         self._round_start = 0.0
         self._last_fired = 0.0
@@ -118,23 +121,25 @@ class Player:
         dt = 0.0 if self._last_time is None else min(sim_time - self._last_time, _MAX_STEP_S)
         self._last_time = sim_time
         now = sim_time - self._start
-        commands = Commands()
+        # What costs time only where something happens: a campaign comes here in each frame.
+        actions: List[Action] = []
+        if self._held_back:
+            held_back, self._held_back = self._held_back, []
+            for value in held_back:
+                self._excite(value, now, 0.0, actions)
         self._taps.clear()
-        held_back, self._held_back = self._held_back, []
-        for value in held_back:
-            self._excite(value, now, 0.0, commands.actions)
-        self._fire(now, sample, commands.actions)
-        self._fly(now, dt, sample, commands)
-        commands.handles = dict(self._handles)
-        commands.taps = self._taps - self._buttons
-        commands.buttons = self._buttons | commands.taps
-        commands.finished = self._finished and not self._held_back
-        return commands
+        if now >= self._quiet_until:
+            self._fire(now, sample, actions)
+        stick = self._fly(now, dt, sample)
+        taps = self._taps - self._buttons
+        finished = self._finished and not self._held_back
+        return Commands(stick, self._throttle, dict(self._handles), self._buttons | taps, taps, actions, finished)
 
     # --- events -------------------------------------------------------------------------------------------------------
 
     def _fire(self, now: float, sample: FlightSample, actions: List[Action]) -> None:
         events, repeat = self.scenario.events, self.scenario.repeat_every
+        self._quiet_until = -math.inf
         while not self._finished:
             if self._next >= len(events):
                 if repeat is None:
@@ -155,7 +160,10 @@ class Player:
                 due = self._last_fired + event.after
             else:  # it is its turn when the event before it has happened
                 due = max(self._round_start + event.at, self._last_fired)
-            if now < due or not self._ready(event, now, due, sample):
+            if now < due:
+                self._quiet_until = due if repeat is None else min(due, self._round_start + repeat)
+                return
+            if not self._ready(event, now, due, sample):
                 return
             self._last_fired = due if not event.when else now
             self._waiting_since = None
@@ -177,10 +185,12 @@ class Player:
         if kind == "stick":
             for axis, target in value.items():
                 present = self._present(axis, now)
-                self._axes[axis] = _Ramp(now, event.over, present, target)
+                self._moving[axis] = _Ramp(now, event.over, present, target)
                 self._release(axis)
+            self._holding = self.targets.any()
         elif kind == "hold":
             self.targets.update(value)
+            self._holding = self.targets.any()
         elif kind == "handles":
             self._handles.update(value)
         elif kind == "buttons":
@@ -204,8 +214,10 @@ class Player:
         """Where a movement of this axis begins: where a hold has it, or else the movement before."""
         if axis in self._held:
             return self._held[axis]
-        if axis in self._axes:
-            return self._axes[axis].at(now)
+        if axis in self._moving:
+            return self._moving[axis].at(now)
+        if axis in self._moved:
+            return self._moved[axis]
         return self._throttle or 0.0 if axis == "throttle" else 0.0
 
     def _release(self, axis: str) -> None:
@@ -220,7 +232,35 @@ class Player:
 
     # --- flying -------------------------------------------------------------------------------------------------------
 
-    def _fly(self, now: float, dt: float, s: FlightSample, commands: Commands) -> None:
+    def _fly(self, now: float, dt: float, s: FlightSample) -> Dict[str, float]:
+        """The stick, without the throttle, which it moves as well."""
+        if self._holding:
+            held = self._hold(now, dt, s)
+            self._held = {axis: value for axis, value in held.items() if math.isfinite(value)}
+            for axis in held:  # it does not go back to an earlier movement when it is let go
+                self._moving.pop(axis, None)
+                self._moved.pop(axis, None)
+        else:
+            held = {}
+            self._autopilot.let_go()
+            self._held.clear()
+        if self._moving:
+            for axis, ramp in self._moving.items():
+                self._moved[axis] = ramp.at(now)
+            self._moving = {axis: ramp for axis, ramp in self._moving.items() if now - ramp.start_time < ramp.duration}
+        stick = {"roll": 0.0, "pitch": 0.0, "yaw": 0.0, **self._moved, **held}
+        throttle = stick.pop("throttle", None)
+        if throttle is not None and math.isfinite(throttle):
+            self._throttle = throttle
+        for axis, value in stick.items():
+            if self._apply_excitations:
+                value += self._excitation(axis, now)
+            low, high = STICK_AXES[axis]
+            stick[axis] = min(max(value, low), high)
+        return stick
+
+    def _hold(self, now: float, dt: float, s: FlightSample) -> Dict[str, float]:
+        """What the targets make of stick and throttle, for the axes that they hold."""
         autopilot, targets = self._autopilot, self.targets
         held = {
             "roll": autopilot.roll(targets, s.roll, s.roll_rate, s.heading),
@@ -230,24 +270,9 @@ class Player:
             "yaw": autopilot.yaw(targets, s.yaw_rate),
             "throttle": autopilot.throttle(targets, dt, s.speed, 0.5 if self._throttle is None else self._throttle),
         }
-        self._held = {axis: value for axis, value in held.items() if value is not None and math.isfinite(value)}
-        for axis, (low, high) in STICK_AXES.items():
-            value = held[axis]
-            if value is not None:  # it does not go back to an earlier movement when it is let go
-                self._axes.pop(axis, None)
-            elif axis in self._axes:
-                value = self._axes[axis].at(now)
-            if axis == "throttle":
-                if value is not None and math.isfinite(value):
-                    self._throttle = value
-                commands.throttle = self._throttle
-            else:
-                value = (value or 0.0) + self._excitation(axis, now)
-                commands.stick[axis] = min(max(value, low), high)
+        return {axis: value for axis, value in held.items() if value is not None}
 
     def _excitation(self, axis: str, now: float) -> float:
-        if not self._apply_excitations:
-            return 0.0
         self._running = [(start, p) for start, p in self._running if now - start < p["duration"]]
         total = sum(excitations.value(p, now - start) for start, p in self._running if p["target"] == axis)
         return total if math.isfinite(total) else 0.0

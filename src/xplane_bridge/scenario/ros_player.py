@@ -52,7 +52,7 @@ def sample_of(state: Any, mode: int, stall_warning: bool) -> FlightSample:
 
 def command_values(commands: Commands) -> Dict[str, float]:
     """Stick, throttle and handles as fields of ControlCommand; nothing else is commanded."""
-    values = {axis: commands.stick[axis] for axis in ("roll", "pitch", "yaw")}
+    values = dict(commands.stick)
     if commands.throttle is not None:
         values["throttle"] = commands.throttle
     for handle, value in commands.handles.items():
