@@ -6,7 +6,9 @@
 #include <array>
 #include <memory>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "xplane_bridge/core/control/control_arbiter.hpp"
 #include "xplane_bridge/core/control/control_channels.hpp"
@@ -20,7 +22,7 @@ struct Arbiter {
 
   Arbiter(const core::ArbiterOptions& options, double now) : arbiter(options, now) {
     for (std::size_t i = 0; i < names.size(); ++i) {
-      names[i] = Object(PyUnicode_FromString(core::channelName(static_cast<core::Channel>(i)).c_str()));
+      names[i] = Object(PyUnicode_InternFromString(core::channelName(static_cast<core::Channel>(i)).c_str()));
     }
   }
 };
@@ -59,14 +61,20 @@ class Table {
     if (value) ++used_;
     return value;
   }
+  PyObject* find(const Object& key) {
+    PyObject* value = PyDict_GetItemWithError(dictionary_, key.get());
+    if (value) ++used_;
+    if (!value && PyErr_Occurred()) throw PythonError{};
+    return value;
+  }
   double number(const char* key, double fallback) {
     PyObject* value = find(key);
     return value ? bindings::number(value) : fallback;
   }
-  void refuseRest(const std::string& expected) const {
+  void refuseRest(std::string_view expected) const {
     if (used_ == PyDict_Size(dictionary_)) return;
     throw std::invalid_argument(path_ + " has " + std::to_string(PyDict_Size(dictionary_) - used_) +
-                                " unknown keys; expected some of " + expected);
+                                " unknown keys; expected some of " + std::string(expected));
   }
 
  private:
@@ -128,23 +136,39 @@ void readEngines(PyObject* sequence, std::uint32_t field, std::array<double, cor
   out.fields |= field;
 }
 
+/// Of a command's values: a flight looks for each in each of its frames.
+struct CommandKeys {
+  std::vector<Object> scalars;  // in the order of core::kScalarChannels
+  Object throttle{PyUnicode_InternFromString("throttle")};
+  Object engine_throttles{PyUnicode_InternFromString("engine_throttles")};
+  Object motors{PyUnicode_InternFromString("motors")};
+
+  CommandKeys() {
+    for (const core::ScalarChannel& scalar : core::kScalarChannels) {
+      scalars.emplace_back(PyUnicode_InternFromString(scalar.name));
+    }
+  }
+};
+
 core::ControlCommand readCommand(PyObject* dictionary) {
+  static const CommandKeys& keys = *new CommandKeys();  // never ended: Python ends before static objects do
   core::ControlCommand out;
   Table in(dictionary, "command");
+  auto key = keys.scalars.begin();
   for (const core::ScalarChannel& scalar : core::kScalarChannels) {
-    PyObject* value = in.find(scalar.name);
+    PyObject* value = in.find(*key++);
     if (!value) continue;
     out.*scalar.value = rounded(number(value));
     out.fields |= scalar.field;
   }
-  if (PyObject* value = in.find("throttle")) {
+  if (PyObject* value = in.find(keys.throttle)) {
     out.throttle = rounded(number(value));
     out.fields |= core::kFieldThrottle;
   }
-  if (PyObject* value = in.find("engine_throttles")) {
+  if (PyObject* value = in.find(keys.engine_throttles)) {
     readEngines(value, core::kFieldEngineThrottles, out.engine_throttles, out);
   }
-  if (PyObject* value = in.find("motors")) readEngines(value, core::kFieldMotors, out.motors, out);
+  if (PyObject* value = in.find(keys.motors)) readEngines(value, core::kFieldMotors, out.motors, out);
   in.refuseRest("the values of ControlCommand.msg");
   return out;
 }

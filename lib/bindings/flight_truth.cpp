@@ -14,11 +14,7 @@ struct Parts {
                "alpha_rad",      "beta_rad",      "calibrated_airspeed_mps",
                "wind_north_mps", "wind_east_mps", "wind_down_mps",
                "mass_kg"};
-  Names thrust{"thrust_n"};
-  Names rpm{"rpm"};
-  Object quaternion{PyUnicode_InternFromString("quaternion")};
-  Object surfaces{PyUnicode_InternFromString("surfaces_deg")};
-  Object engines{PyUnicode_InternFromString("engines")};
+  Name thrust{"thrust_n"}, rpm{"rpm"}, quaternion{"quaternion"}, surfaces{"surfaces_deg"}, engines{"engines"};
 };
 
 PyObject* truthBytes(PyObject* /*module*/, PyObject* state) {
@@ -26,13 +22,13 @@ PyObject* truthBytes(PyObject* /*module*/, PyObject* state) {
     static const Parts& p = *new Parts();  // never ended: Python ends before static objects do
     std::vector<double> out(p.place.size() + 4 + p.motion.size());
     p.place.read(state, out.data());
-    readNumbers(attribute(state, p.quaternion.get()).get(), out.data() + p.place.size(), 4);
+    readNumbers(p.quaternion.of(state).get(), out.data() + p.place.size(), 4);
     p.motion.read(state, out.data() + p.place.size() + 4);
-    const Object deflections(PyDict_Values(attribute(state, p.surfaces.get()).get()));
+    const Object deflections(PyDict_Values(p.surfaces.of(state).get()));
     for (const Object& deflection : items(deflections.get())) out.push_back(number(deflection.get()));
-    const std::vector<Object> all = items(attribute(state, p.engines.get()).get());
-    for (const Names* name : {&p.thrust, &p.rpm}) {
-      for (const Object& engine : all) name->read(engine.get(), &out.emplace_back());
+    const std::vector<Object> all = items(p.engines.of(state).get());
+    for (const Name* name : {&p.thrust, &p.rpm}) {
+      for (const Object& engine : all) out.push_back(name->numberOf(engine.get()));
     }
     return PyBytes_FromStringAndSize(reinterpret_cast<const char*>(out.data()),
                                      static_cast<Py_ssize_t>(out.size() * sizeof(double)));

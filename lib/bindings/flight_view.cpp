@@ -80,7 +80,7 @@ struct Parts {
               "specific_force_y_mps2",
               "specific_force_z_mps2"};
   Names stick{"roll", "pitch", "yaw"};
-  Object throttle{PyUnicode_InternFromString("throttle")};
+  Name throttle{"throttle"};
 };
 
 Rows levelRows(double latitude_deg, double longitude_deg) {
@@ -229,7 +229,7 @@ PyObject* flightNumbers(PyObject* /*module*/, PyObject* arguments) {
     parts.state.read(state, s.data());
     std::array<double, 4> stick{};
     parts.stick.read(controls, stick.data());
-    readNumbers(attribute(controls, parts.throttle.get()).get(), &stick[3], 1);
+    readNumbers(parts.throttle.of(controls).get(), &stick[3], 1);
     const core::FlightInputs in =
         inputsOf(s, stick, period, s[kAgl] - standing_height + parked_height, origin_latitude, origin_longitude);
     return numbersOf(core::computeFlightState(in, core::localPosition(in), core::TangentFrame())).release();

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "xplane_bridge/bindings/names.hpp"
 #include "xplane_bridge/bindings/python_property.hpp"
 #include "xplane_bridge/bindings/python_type.hpp"
 #include "xplane_bridge/bindings/twin_physics.hpp"
@@ -26,12 +27,11 @@ double modulo(double value, double divisor) {
 
 class Reader {
  public:
-  explicit Reader(PyObject* getters) : quaternion_(PyUnicode_InternFromString("quaternion")) {
+  explicit Reader(PyObject* getters) : names_(kNames.begin(), kNames.end()), quaternion_("quaternion") {
     for (const Object& getter : items(getters)) getters_.emplace_back(getter);
     if (getters_.size() != kInputs) {
       throw std::invalid_argument("StateReader: expected " + std::to_string(kInputs) + " getters");
     }
-    for (const char* name : kNames) names_.emplace_back(PyUnicode_InternFromString(name));
     // Not worked out anew: Python's ** rounds otherwise than a product.
     const Object units(PyImport_ImportModule("xplane_bridge.emulator.flight.jsbsim_state"));
     foot_ = constant(units, "FOOT_M");
@@ -54,11 +54,9 @@ class Reader {
     readNumbers(gravity_force, gravity.data(), gravity.size());
     const Quaternion rotation = rotationOf(in[4], in[5], in[6]);
     const std::array<double, kOutputs> out = work(in, rotation, gravity);
-    for (std::size_t i = 0; i < kOutputs; ++i) {
-      check(PyObject_SetAttr(state, names_[i].get(), makeNumber(out[i]).get()));
-    }
+    for (std::size_t i = 0; i < kOutputs; ++i) names_[i].set(state, out[i]);
     const Object quaternion(Py_BuildValue("(dddd)", rotation.w, rotation.x, rotation.y, rotation.z));
-    check(PyObject_SetAttr(state, quaternion_.get(), quaternion.get()));
+    quaternion_.set(state, quaternion.get());
   }
 
  private:
@@ -198,8 +196,8 @@ class Reader {
   }
 
   std::vector<Property> getters_;
-  std::vector<Object> names_;
-  Object quaternion_;
+  std::vector<Name> names_;
+  Name quaternion_;
   double foot_ = 0.0, pound_force_ = 0.0, slug_ = 0.0, knot_ = 0.0, psf_ = 0.0, density_ = 0.0, pound_foot_ = 0.0,
          inch_ = 0.0, rankine_ = 0.0, earth_radius_ = 0.0, gravity_ = 0.0;
 };

@@ -7,31 +7,12 @@
 #include <string>
 #include <utility>
 
+#include "xplane_bridge/bindings/names.hpp"
+
 namespace xplane_bridge::bindings {
 namespace {
 
 constexpr double kStallSpeed = 15.0;  // [m/s] below which nothing warns
-
-/// A name that is looked up in many objects.
-class Name {
- public:
-  Name(const char* text) : text_(PyUnicode_InternFromString(text)) {}  // NOLINT(google-explicit-constructor)
-
-  Object of(PyObject* owner) const { return attribute(owner, text_.get()); }
-  double numberOf(PyObject* owner) const { return number(of(owner).get()); }
-  bool trueFor(PyObject* owner) const {
-    const int answer = PyObject_IsTrue(of(owner).get());
-    check(answer);
-    return answer == 1;
-  }
-  void set(PyObject* owner, PyObject* value) const { check(PyObject_SetAttr(owner, text_.get(), value)); }
-  void set(PyObject* owner, double value) const { set(owner, makeNumber(value).get()); }
-  void set(PyObject* owner, bool value) const { set(owner, value ? Py_True : Py_False); }
-  PyObject* get() const { return text_.get(); }
-
- private:
-  Object text_;
-};
 
 Object item(PyObject* sequence, std::size_t index) {
   return Object(PySequence_GetItem(sequence, static_cast<Py_ssize_t>(index)));
@@ -81,7 +62,7 @@ struct EngineParts {
 };
 
 /// What is looked up in the model, the controls and the state each time.
-struct Names {
+struct FrameNames {
   Name state{"state"}, fuel{"_fuel_kg"}, payload{"_payload_kg"}, payload_aft{"_payload_aft_m"},
       gravity{"_gravity_force"}, commands{"_commands"};
   Name roll{"roll"}, pitch{"pitch"}, yaw{"yaw"}, trim_roll{"trim_roll"}, trim_pitch{"trim_pitch"}, trim_yaw{"trim_yaw"},
@@ -185,7 +166,7 @@ struct TwinFrame::Parts {
   static constexpr std::size_t kSurfaces = 9;  // of FixedWing._mix
   enum Surface : std::size_t { kLeftFlap = 5, kRightFlap, kLeftBrake, kRightBrake };
 
-  Names names;
+  FrameNames names;
   Object gear;
   Attribute gear_position, gear_steering;
   double gear_travel_s = 0.0;
@@ -206,7 +187,7 @@ TwinFrame::~TwinFrame() = default;
 
 void TwinFrame::begin(PyObject* model, double dt, PyObject* controls) const {
   const Parts& p = *parts_;
-  const Names& names = p.names;
+  const FrameNames& names = p.names;
   if (p.gear_travel_s > 0.0 && !names.gear_fault.trueFor(controls)) {
     const double wanted = names.gear_down.trueFor(controls) ? 1.0 : 0.0, reach = dt / p.gear_travel_s;
     const double position = p.gear_position.getNumber();
@@ -237,7 +218,7 @@ void TwinFrame::begin(PyObject* model, double dt, PyObject* controls) const {
 
 std::vector<SurfaceOrder> TwinFrame::orders(PyObject* model, PyObject* controls) const {
   const Parts& p = *parts_;
-  const Names& names = p.names;
+  const FrameNames& names = p.names;
   const double roll = clip(names.roll.numberOf(controls), -1.0, 1.0);
   const double pitch = clip(names.pitch.numberOf(controls), -1.0, 1.0);
   const double yaw = clip(names.yaw.numberOf(controls), -1.0, 1.0);
@@ -284,7 +265,7 @@ std::vector<SurfaceOrder> TwinFrame::orders(PyObject* model, PyObject* controls)
 
 std::vector<Throttle> TwinFrame::throttles(PyObject* controls) const {
   const Parts& p = *parts_;
-  const Names& names = p.names;
+  const FrameNames& names = p.names;
   const bool overridden = names.override_throttles.trueFor(controls);
   const Object levers = (overridden ? names.throttle_use : names.throttle).of(controls);
   const Object propellers = names.propeller.of(controls), mixtures = names.mixture.of(controls);
@@ -308,7 +289,7 @@ void TwinFrame::load(PyObject* model) const {
 
 void TwinFrame::fill(PyObject* model, PyObject* state, PyObject* controls) const {
   const Parts& p = *parts_;
-  const Names& names = p.names;
+  const FrameNames& names = p.names;
   const Object surfaces = names.surfaces.of(state);
   std::array<double, Parts::kSurfaces> angles{};
   for (std::size_t i = 0; i < angles.size(); ++i) {

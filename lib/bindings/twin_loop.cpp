@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "xplane_bridge/bindings/names.hpp"
 #include "xplane_bridge/bindings/python_type.hpp"
 #include "xplane_bridge/bindings/twin_frame.hpp"
 #include "xplane_bridge/bindings/twin_physics.hpp"
@@ -26,10 +27,9 @@ constexpr double kStrutsWorkCosine = 0.5;
 constexpr double kThinnestAir = 1e-3;  // [kg/m3]
 
 /// Attributes of the model itself, which the loop must not keep: the model has the loop.
-struct Names {
-  static Object name(const char* text) { return Object(PyUnicode_InternFromString(text)); }
-  Object fuel = name("_fuel_kg"), wind = name("_wind"), gravity = name("_gravity_force"), step = name("_fdm_step"),
-         crashed = name("_crashed"), gusts = name("_gusts");
+struct ModelNames {
+  Name fuel{"_fuel_kg"}, wind{"_wind"}, gravity{"_gravity_force"}, step{"_fdm_step"}, crashed{"_crashed"},
+      gusts{"_gusts"};
 };
 
 class Loop {
@@ -121,7 +121,7 @@ class Loop {
     for (auto& rotor : rotors_) rotor->mirror.read();
     for (auto& governor : governors_) governor->mirror.read();
     for (auto& engine : engines_) engine->read();
-    const Object fuel = attribute(model, names_.fuel.get());
+    const Object fuel = names_.fuel.of(model);
     fuel_.resize(static_cast<std::size_t>(std::max<Py_ssize_t>(PySequence_Size(fuel.get()), 0)));
     if (fuel_.size() < engines_.size()) throw std::invalid_argument("_fuel_kg: expected a tank for each engine");
     readNumbers(fuel.get(), fuel_.data(), fuel_.size());
@@ -131,18 +131,18 @@ class Loop {
     for (const auto& rotor : rotors_) rotor->mirror.write();
     for (const auto& governor : governors_) governor->mirror.write();
     for (const auto& engine : engines_) engine->write();
-    writeNumbers(attribute(model, names_.fuel.get()).get(), fuel_.data(), fuel_.size());
+    writeNumbers(names_.fuel.of(model).get(), fuel_.data(), fuel_.size());
   }
 
   void read(PyObject* model) {
     readEngines(model);
     for (auto& surface : surfaces_) surface->read();
     turbulence_.read();
-    readNumbers(attribute(model, names_.wind.get()).get(), steady_wind_.data(), steady_wind_.size());
-    readNumbers(attribute(model, names_.gravity.get()).get(), gravity_.data(), gravity_.size());
+    readNumbers(names_.wind.of(model).get(), steady_wind_.data(), steady_wind_.size());
+    readNumbers(names_.gravity.of(model).get(), gravity_.data(), gravity_.size());
     gear_position_ = gear_position_now_.getNumber();
-    fdm_step_ = number(attribute(model, names_.step.get()).get());
-    crashed_ = PyObject_IsTrue(attribute(model, names_.crashed.get()).get()) == 1;
+    fdm_step_ = names_.step.numberOf(model);
+    crashed_ = names_.crashed.trueFor(model);
     height_m_ = agl_.get() * kFoot;
     // Others set them between frames.
     applied_deg_.assign(surfaces_.size(), std::numeric_limits<double>::quiet_NaN());
@@ -154,8 +154,8 @@ class Loop {
     writeEngines(model);
     for (const auto& surface : surfaces_) surface->write();
     turbulence_.write();
-    check(PyObject_SetAttr(model, names_.step.get(), makeNumber(fdm_step_).get()));
-    check(PyObject_SetAttr(model, names_.crashed.get(), crashed_ ? Py_True : Py_False));
+    names_.step.set(model, fdm_step_);
+    names_.crashed.set(model, crashed_);
     if (!blown_) return;
     const Object gusts(PyList_New(3));
     for (Py_ssize_t axis = 0; axis < 3; ++axis) {
@@ -163,7 +163,7 @@ class Loop {
       if (!gust) throw PythonError{};
       PyList_SetItem(gusts.get(), axis, gust);
     }
-    check(PyObject_SetAttr(model, names_.gusts.get(), gusts.get()));
+    names_.gusts.set(model, gusts.get());
   }
 
   Air readAir(bool floor) const {
@@ -258,7 +258,7 @@ class Loop {
   Property alpha_, pressure_, temperature_, agl_, roll_, pitch_, heading_, airspeed_, extend_gear_, set_dt_, run_, hit_;
   Object gear_;
   Attribute gear_position_now_;
-  const Names names_;
+  const ModelNames names_;
   double contact_height_ = 0.0, density_unit_ = 1.0, pressure_unit_ = 1.0, temperature_unit_ = 1.0;
   int contact_runs_ = 1;
   std::vector<std::unique_ptr<SurfaceMirror>> surfaces_;  // pointers: the mirrors point into what they mirror

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import fields
 from typing import Any, Dict, Mapping, Set, Tuple
 
 from xplane_bridge.emulator.command_channels import TRIMS
@@ -18,6 +19,7 @@ from xplane_bridge.emulator.scenario_pilot import failure_leaves, in_part
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.surfaces import SURFACES
 
+_CONTROLS = [f.name for f in fields(Controls)]
 _MOST_STUCK_DEG = 90.0
 #: Kinds of a surface's failure that take a value.
 WITH_VALUE = ("stuck", "reduced", "slow")
@@ -126,7 +128,9 @@ class Failures:
             controls.surface_faults = self._faults
             return controls
         flown = self._flown
-        vars(flown).update(vars(controls), throttle=controls.throttle.copy())  # all else is replaced, not changed
+        for name in _CONTROLS:
+            setattr(flown, name, getattr(controls, name))
+        flown.throttle = controls.throttle.copy()  # all else is replaced, not changed
         self._effects.apply(flown, self._systems, self._model, dt)
         self._repaired = not self._systems
         flown.surface_faults = {**flown.surface_faults, **self._faults}

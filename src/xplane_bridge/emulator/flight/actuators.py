@@ -98,10 +98,8 @@ class SurfaceSet:
 
     def check(self, controls: Controls) -> None:
         """Raises ``FlightModelError`` for an unknown surface or a fault whose value makes no sense."""
-        for name in list(controls.surface_faults) + list(controls.surface_deg):
-            if name not in self.by_name:
-                raise FlightModelError(f"no surface '{name}': this aircraft has {', '.join(self.by_name) or 'none'}")
         for name, fault in controls.surface_faults.items():
+            self._check_name(name)
             is_share = fault.kind in (SurfaceFaultKind.REDUCED, SurfaceFaultKind.SLOW)
             if is_share and (fault.value is None or not 0.0 <= fault.value <= 1.0):
                 raise FlightModelError(f"fault {fault.kind.value} of '{name}' has value {fault.value}, expected 0..1")
@@ -110,8 +108,13 @@ class SurfaceSet:
                     f"fault {fault.kind.value} of '{name}' has value {fault.value}, expected degrees"
                 )
         for name, angle in controls.surface_deg.items():
+            self._check_name(name)
             if not math.isfinite(angle):
                 raise FlightModelError(f"surface '{name}' is commanded to {angle}, expected degrees")
+
+    def _check_name(self, name: str) -> None:
+        if name not in self.by_name:
+            raise FlightModelError(f"no surface '{name}': this aircraft has {', '.join(self.by_name) or 'none'}")
 
     def step(self, targets_deg: Sequence[float], dt: float, controls: Controls, alpha_deg: float) -> None:
         """Moves every surface; ``targets_deg`` in the order of the specifications."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import xml.etree.ElementTree as ElementTree
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Optional, Sequence, Tuple, TypeVar
 
@@ -64,6 +65,7 @@ _ROOT = Path(__file__).resolve().parents[1]  # holds aircraft/
 _T = TypeVar("_T")
 
 
+@lru_cache(maxsize=16)
 def substeps(dt: float) -> Tuple[int, float]:
     """Number and length [s] of the JSBSim steps that fly `dt`."""
     count = max(1, math.ceil(dt / MAX_SUBSTEP_S - 1e-6))
