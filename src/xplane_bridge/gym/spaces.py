@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from operator import attrgetter
-from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
+from operator import attrgetter, itemgetter
+from typing import Any, Callable, Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 from gymnasium import spaces
@@ -13,6 +13,7 @@ from xplane_bridge.constants import COMMAND_FIELDS
 from xplane_bridge.emulator.command_channels import ATTRIBUTES
 from xplane_bridge.emulator.flight.flight_model import Controls, ModelInfo
 from xplane_bridge.gym.errors import GymError
+from xplane_bridge.in_process.view import FlightView, place_of
 
 
 class Field(NamedTuple):
@@ -109,12 +110,12 @@ class Observer:
         self.space = spaces.Box(np.array(low, np.float32), np.array(high, np.float32), dtype=np.float32)
         # The last first, so that what is put in moves nothing that is still to come.
         self._turning = [i for i, name in enumerate(fields) if FIELDS[name].turns][::-1]
-        single = attrgetter(*fields)
-        self._get = single if len(fields) > 1 else lambda state: (single(state),)
+        self._get = _several(attrgetter, fields)
+        self._get_in_process = _several(itemgetter, [place_of(name) for name in fields])
 
     def observe(self, state: Any) -> np.ndarray:
         """A new observation of a FlightState."""
-        values = list(self._get(state))
+        values = list((self._get_in_process if type(state) is FlightView else self._get)(state))
         for i in self._turning:
             angle = math.radians(values[i])
             values[i : i + 1] = math.sin(angle), math.cos(angle)
@@ -122,6 +123,12 @@ class Observer:
         np.maximum(out, self.space.low, out=out)
         np.minimum(out, self.space.high, out=out)
         return out
+
+
+def _several(getter: Callable[..., Callable[[Any], Any]], which: Sequence[Any]) -> Callable[[Any], Sequence[float]]:
+    """What an attrgetter or itemgetter gets, as a sequence also where it is one number."""
+    get = getter(*which)
+    return get if len(which) > 1 else lambda state: (get(state),)
 
 
 class Commander:

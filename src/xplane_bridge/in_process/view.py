@@ -77,6 +77,24 @@ class _Numbers(NamedTuple):
     wind_from_deg: float
 
 
+#: Vectors of FlightState, and the first of their three numbers.
+_VECTORS = {
+    "angular_velocity": "p", "angular_acceleration": "p_dot", "velocity_ned": "v_north", "velocity_body": "u",
+    "wind_ned": "wind_north", "specific_force": "force_x",
+}  # fmt: skip
+
+
+def place_of(field: str) -> int:
+    """Where the tuple that a FlightView is has a number of FlightState, such as `roll_deg` or `velocity_ned.x`.
+
+    Raises:
+        ValueError: It has none of that name.
+    """
+    vector, _, axis = field.partition(".")
+    first = _Numbers._fields.index(_VECTORS.get(vector, vector))
+    return first + "xyz".index(axis) if axis else first
+
+
 class FlightView(_Numbers):
     """One instant of a flight, as `rx_node` publishes it: fields of `FlightState.msg`, worked out by its own code.
 

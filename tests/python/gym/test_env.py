@@ -4,6 +4,8 @@ import math
 import re
 import struct
 import warnings
+from operator import attrgetter
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
@@ -17,7 +19,9 @@ from xplane_bridge.compiled import NotCompiledError
 from xplane_bridge.emulator.flight.flight_model import FlightModelError
 from xplane_bridge.gym import FlyEnv, Hover, Task, WingsLevel
 from xplane_bridge.gym.errors import GymError
-from xplane_bridge.gym.spaces import FIELDS
+from xplane_bridge.gym.spaces import FIELDS, Observer
+from xplane_bridge.in_process.aircraft import Aircraft, Conditions
+from xplane_bridge.in_process.view import place_of
 
 AIRCRAFT = ("FixedWing", "Multirotor", "Tiltrotor")
 STICK = ("roll", "pitch", "yaw")
@@ -51,6 +55,23 @@ def test_what_is_observed_has_the_names_and_units_of_the_message() -> None:
     for name, field in FIELDS.items():
         bounds = "sine and cosine" if field.turns else f"{field.low:g} .. {field.high:g}"
         assert f"| `{name}` | {field.unit} | {bounds} |" in page
+
+
+def test_a_field_is_the_same_of_a_flight_in_process_as_of_a_message() -> None:
+    conditions = Conditions("fixed_wing", weather={"turbulence": 3.0, "wind_speed": 5.0, "wind_from": 40.0})
+    aircraft = Aircraft(conditions)
+    for _ in range(30):
+        aircraft.step()
+    view = aircraft.view()
+    places = {name: place_of(name) for name in FIELDS}
+    assert {name: view[place] for name, place in places.items()} == {name: attrgetter(name)(view) for name in FIELDS}
+    assert len(set(places.values())) == len(FIELDS)
+    as_message = SimpleNamespace(**{name.partition(".")[0]: getattr(view, name.partition(".")[0]) for name in FIELDS})
+    for fields in (["angular_velocity.y"], ["wind_ned.x", "track_deg", "control_throttle"]):
+        observer = Observer(fields)
+        assert observer.observe(view).tolist() == observer.observe(as_message).tolist()
+    with pytest.raises(ValueError, match="not in tuple"):
+        place_of("heading_magnetic_deg")
 
 
 def test_an_action_flies_in_the_next_frame_as_float32_and_the_first_at_once() -> None:
