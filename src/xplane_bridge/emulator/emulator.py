@@ -295,16 +295,17 @@ class Emulator:
             OSError: The port was taken while a restart was played, or in lock-step the window is gone.
         """
         try:
-            if self.options.stepped == "fast":
-                self._run_fast()
-            elif self.options.stepped == "lines":
-                self._run_lines(sys.stdin, sys.stdout)
-            else:
-                with collected_by_hand():
-                    if self._fences is not None:
-                        self._run_lockstep(self._fences)
-                    else:
-                        self._run_real_time()
+            with np.errstate(over="ignore"):  # of a number that is infinite as float32; not in each frame, which costs
+                if self.options.stepped == "fast":
+                    self._run_fast()
+                elif self.options.stepped == "lines":
+                    self._run_lines(sys.stdin, sys.stdout)
+                else:
+                    with collected_by_hand():
+                        if self._fences is not None:
+                            self._run_lockstep(self._fences)
+                        else:
+                            self._run_real_time()
         finally:
             self.close()
 

@@ -123,10 +123,9 @@ class _Plan:
         self._compute = plan(slots)
 
     def datagrams(self, values: np.ndarray) -> List[Datagram]:
-        """Those of a frame."""
+        """Those of a frame; what is too large for float32 is infinite there."""
         self._compute()
-        with np.errstate(over="ignore"):
-            self._layout[self._floats] = values[self._slots]
+        self._layout[self._floats] = values[self._slots]
         filled = self._layout.tobytes()
         return [(filled[start:end], client) for start, end, client in self._cuts]
 

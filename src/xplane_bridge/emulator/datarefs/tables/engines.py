@@ -68,11 +68,14 @@ def define(t: Table, sim: Sources) -> None:
     else:
         lever = t.store.dataref(_ACTUATORS + "throttle_ratio").slots
         mode = t.store.dataref(_ENGINE + "ENGN_propmode").slots
-        lever, mode = lever[: len(mode)], mode[: len(lever)]
-        t.array(
-            _ACTUATORS + "throttle_jet_rev_ratio",
-            lambda _: np.where(t.store.values[mode] == REVERSE, -t.store.values[lever], t.store.values[lever]),
-        )
+        count = min(len(lever), len(mode))
+        both = np.concatenate((lever[:count], mode[:count]))
+
+        def with_sign(_: Frame) -> List[float]:
+            read: List[float] = t.store.values[both].tolist()
+            return [-ratio if of == REVERSE else ratio for ratio, of in zip(read[:count], read[count:])]
+
+        t.array(_ACTUATORS + "throttle_jet_rev_ratio", with_sign)
     for name in ("throttle_ratio_all", "throttle_jet_rev_ratio_all"):
         t.setting(_ACTUATORS + name)
     t.setting(_ACTUATORS + "mixture_ratio")
