@@ -21,6 +21,7 @@ import threading
 import time
 from typing import Any, BinaryIO
 
+from support.nodes import forked_renderer
 from xplane_bridge.harness import EmulatorProcess, HarnessError
 from xplane_bridge.harness.processes import Process, end_with_parent
 
@@ -176,8 +177,7 @@ def _report_ended(link: socket.socket, numbers: dict[int, int]) -> None:
             pid, status = os.waitpid(-1, os.WNOHANG)
             if not pid:
                 break
-            code = -os.WTERMSIG(status) if os.WIFSIGNALED(status) else os.WEXITSTATUS(status)
-            _say(link, "ended", numbers.pop(pid), code)
+            _say(link, "ended", numbers.pop(pid), forked_renderer.exit_code(status))
 
 
 def _say(link: socket.socket, what: str, number: int, value: int) -> None:
@@ -189,6 +189,8 @@ def run() -> int:
     from xplane_bridge.cli import xplane_emulator
     from xplane_bridge.emulator.flight import jsbsim_model  # noqa: F401
 
+    forked_renderer.import_modules()
+    forked_renderer.use()
     gc.collect()
     gc.freeze()
     order = serve(socket.socket(fileno=int(sys.argv[1])))

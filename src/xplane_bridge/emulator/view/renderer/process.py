@@ -8,7 +8,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Optional
+from typing import Mapping, Optional, Sequence
 
 from xplane_bridge.emulator.view.renderer.scene import RECORD_BYTES, Scene
 from xplane_bridge.errors import XplaneBridgeError
@@ -89,13 +89,7 @@ class RendererProcess:
             environment["SDL_VIDEO_WINDOW_POS"] = "{},{}".format(*options.place)
         source = str(Path(__file__).resolve().parents[4])
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, [source, environment.get("PYTHONPATH", "")]))
-        self._child = subprocess.Popen(
-            [sys.executable, "-m", __package__, *options.arguments()],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            bufsize=0,
-            env=environment,
-        )
+        self._child = self.start_program(options.arguments(), environment)
         assert self._child.stdin is not None
         assert self._child.stdout is not None
         said = self._child.stdout.readline().decode(errors="replace").strip()
@@ -105,6 +99,17 @@ class RendererProcess:
         self._scenes, self._answers = self._child.stdin.fileno(), self._child.stdout.fileno()
         self._in_work = 0
         self._silent = False  # the pipes are closed, which comes before the process has ended
+
+    @staticmethod
+    def start_program(arguments: Sequence[str], environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
+        """Starts it, with pipes to its standard input and from its standard output."""
+        return subprocess.Popen(
+            [sys.executable, "-m", __package__, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            bufsize=0,
+            env=environment,
+        )
 
     @property
     def alive(self) -> bool:
