@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Sequence
+from typing import Mapping, NamedTuple, Sequence
 
 from xplane_bridge.bags import FLIGHT_STATE, BagError, Bags
 
@@ -16,7 +16,9 @@ _FRAMES = "xplane_bridge/FrameState"
 class Camera(NamedTuple):
     """One camera's topics, by full name."""
 
-    name: str  #: as `camera.launch` gave it: the name space below the bridge's; `FIRST` of the bridge's own
+    #: As `camera.launch` gave it: the name space below the bridge's; `FIRST` of the bridge's own. The whole name space,
+    #: of each camera, where two would be called alike.
+    name: str
     frames: str  #: FrameState of each picture, at least one message
     info: str  #: CameraInfo, recorded or not
     images: str  #: compressed pictures, else raw ones; empty where none were recorded
@@ -36,7 +38,7 @@ def cameras(bags: Bags) -> list[Camera]:
         name: place[len(space.strip("/")) :] if beside_state else place.partition("/")[2]
         for name, place in places.items()
     }
-    names = short if len(set(short.values())) == len(short) else places
+    names = _names(short, places)
     found = []
     for name in places:
         folder = name.rsplit("/", 1)[0]
@@ -47,9 +49,8 @@ def cameras(bags: Bags) -> list[Camera]:
             # Pictures of an only camera may have any name; those of several have places of their own.
             if info.count and info.msgtype == kind and (len(filled) == 1 or topic.startswith(f"{folder}/"))
         ]
-        called = names[name].strip("/").replace("/", "_") or FIRST
-        found.append(Camera(called, name, f"{folder}/camera_info", images[0] if images else ""))
-    return sorted(found, key=lambda camera: (camera.name != FIRST, camera.name))
+        found.append(Camera(names[name], name, f"{folder}/camera_info", images[0] if images else ""))
+    return sorted(found, key=lambda camera: (short[camera.frames] != "", camera.name))
 
 
 def chosen_cameras(bags: Bags, names: Sequence[str] = ()) -> list[Camera]:
@@ -74,6 +75,16 @@ def chosen_cameras(bags: Bags, names: Sequence[str] = ()) -> list[Camera]:
 def has_jpegs(bags: Bags, camera: Camera) -> bool:
     """Returns whether a camera's pictures were recorded, and compressed."""
     return bool(camera.images) and bags.topics[camera.images].msgtype == COMPRESSED
+
+
+def _names(short: Mapping[str, str], places: Mapping[str, str]) -> Mapping[str, str]:
+    """Give the cameras' names, by topic: short ones, else whole places; files and labels take them apart by these."""
+    # No place has a hyphen: with it for the slash, a/b and a_b differ.
+    for named, slash in ((short, "_"), (places, "_"), (places, "-")):
+        names = {topic: place.strip("/").replace("/", slash) or FIRST for topic, place in named.items()}
+        if len(set(names.values())) == len(names):
+            break
+    return names
 
 
 def _place(topic: str) -> str:

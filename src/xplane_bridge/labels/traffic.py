@@ -6,7 +6,8 @@ Times are the simulator's own, by which a picture's frame and the states of othe
 from __future__ import annotations
 
 import math
-from typing import Iterator, NamedTuple, Optional, Sequence
+from itertools import groupby
+from typing import Dict, Iterable, Iterator, List, NamedTuple, Optional
 
 import numpy as np
 
@@ -23,6 +24,10 @@ _FASTEST_MPS = 400.0
 _ACCELERATION = 10.0
 #: From the reference point, which is recorded, to the middle of what is seen [m].
 _MIDDLE_SIGMA_M = 1.0
+
+
+#: Latitude, longitude [deg], altitude [m] of each aircraft of a state, by its number; None: not known.
+_Listed = Dict[int, Optional[List[float]]]
 
 
 class _Places(NamedTuple):
@@ -77,7 +82,7 @@ class RecordedTraffic:
 
     def __init__(self, bags: Bags, span: float) -> None:
         self._span = span
-        self._times: dict[int, np.ndarray] = {}  #: of all states, by epoch
+        self._times: dict[int, np.ndarray] = {}  #: of the states, by epoch; twice where they changed in a pause
         self._numbers: dict[int, list[frozenset[int]]] = {}  #: who was there, at each of these
         self._places: dict[tuple[int, int], list[_Places]] = {}  #: by epoch and number
         topic = bags.topic_of_type(_TRAFFIC)
@@ -94,8 +99,10 @@ class RecordedTraffic:
             time: Its simulator time [s].
         """
         times = self._times.get(epoch, np.empty(0))
-        after = int(np.searchsorted(times, time, side="left"))
-        exact = after < len(times) and times[after] == time
+        after, later = (int(np.searchsorted(times, time, side=side)) for side in ("left", "right"))
+        if later - after > 1:
+            return None  # one came, went or was placed anew in a pause
+        exact = later > after
         before = after if exact else after - 1
         if before < 0 or after >= len(times) or times[after] - times[before] > _LONGEST_GAP_S:
             return None
@@ -126,33 +133,39 @@ class RecordedTraffic:
         epochs, moments = states["epoch"].astype(int), states["sim_time"].astype(float)
         for epoch in sorted(set(epochs.tolist())):
             here = np.nonzero(epochs == epoch)[0]
-            times, first = np.unique(moments[here], return_index=True)
-            rows = here[first]
-            numbers = [frozenset(int(n) for n in states["number"][row]) for row in rows]
-            self._times[epoch], self._numbers[epoch] = times, numbers
-            for number in sorted(frozenset().union(*numbers)):
-                listed = [_row(states, row, number) for row in rows]
-                self._places[epoch, number] = [_Places(np.array(run)) for run in _runs(times, listed)]
+            rows = here[np.argsort(moments[here], kind="stable")]
+            kept: list[tuple[float, _Listed]] = []
+            for time, alike in groupby(rows.tolist(), key=moments.__getitem__):
+                first, *others = (_listed(states, row) for row in alike)
+                kept.append((float(time), first))
+                # In a pause, time stands: up to it the first state counts, from it on the last one.
+                if any(other != first for other in others):
+                    kept.append((float(time), others[-1]))
+            self._times[epoch] = np.array([time for time, _ in kept])
+            self._numbers[epoch] = [frozenset(listed) for _, listed in kept]
+            for number in sorted(frozenset().union(*self._numbers[epoch])):
+                runs = _runs([(time, listed.get(number)) for time, listed in kept])
+                self._places[epoch, number] = [_Places(np.array(run)) for run in runs]
 
 
-def _row(states: Table, row: int, number: int) -> Optional[list[float]]:
-    numbers = list(states["number"][row])
-    if number not in numbers:
-        return None
-    k = numbers.index(number)
-    place = [float(states[name][row][k]) for name in ("latitude", "longitude", "altitude_msl")]
-    return place if all(map(math.isfinite, place)) else None
+def _listed(states: Table, row: int) -> _Listed:
+    columns = (states[name][row] for name in ("number", "latitude", "longitude", "altitude_msl"))
+    places = {int(number): [float(value) for value in place] for number, *place in zip(*columns)}
+    return {number: place if all(map(math.isfinite, place)) else None for number, place in places.items()}
 
 
-def _runs(times: np.ndarray, places: Sequence[Optional[list[float]]]) -> Iterator[list[list[float]]]:
-    """Stretches of time in which an aircraft was there."""
+def _runs(places: Iterable[tuple[float, Optional[list[float]]]]) -> Iterator[list[list[float]]]:
+    """Stretches of time in which an aircraft was there and was not placed anew in a pause."""
     run: list[list[float]] = []
-    for time, place in zip(times.tolist(), places):
-        if place is not None:
-            run.append([time, *place])
-        elif run:
+    for time, place in places:
+        row = None if place is None else [time, *place]
+        if run and row == run[-1]:
+            continue  # another one was placed anew
+        if run and (row is None or run[-1][0] == time):
             yield run
             run = []
+        if row is not None:
+            run.append(row)
     if run:
         yield run
 

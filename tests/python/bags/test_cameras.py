@@ -63,6 +63,18 @@ def test_the_bridges_own_comes_first_and_each_has_its_own_topics(tmp_path: Path)
         (["/b/camera/frame_state"], "/a/flight_state", []),
         (["/x/a/b/camera/frame_state"], "/x/flight_state", ["a_b"]),
         (["/my/own_frames"], "", ["own_frames"]),
+        # No two are called alike: files and labels take them apart by their names.
+        (["/x/camera/camera/frame_state", "/x/camera/frame_state"], "/x/flight_state", ["x", "x_camera"]),
+        (
+            ["/x/a/b/camera/frame_state", "/x/a_b/camera/frame_state", "/x/camera/frame_state"],
+            "/x/flight_state",
+            ["x", "x-a-b", "x-a_b"],
+        ),
+        (
+            ["/z/camera/frame_state", "/z/camera/camera/frame_state", "/z/a/camera/frame_state"],
+            "/z/flight_state",
+            ["z", "z_a", "z_camera"],
+        ),
         ([], "/x/flight_state", []),
     ],
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Callable, Sequence
+from typing import TYPE_CHECKING, Any, Callable, Optional, Sequence
 
 import cv2
 import numpy as np
@@ -139,6 +139,27 @@ def test_what_is_not_known_is_said(tmp_path: Path) -> None:
     across, standing = recorded.at(1, 3.5) or ()
     assert (across.name, standing.name) == ("1", "3")
     assert across.longitude == pytest.approx(-179.9994), "over the date line"
+
+
+def test_what_changes_in_a_pause_is_not_known_at_its_time_and_new_after_it(tmp_path: Path) -> None:
+    """Simulator time stands in a pause, while states go on coming."""
+    stays, old, new, further = ((0.0, place, 100.0, 0.0, 0.0, 0.0) for place in (0.0, 1.0, 1.0003, 2.0))
+    moments = [9.0, 9.5, 10.0, 10.0, 10.0, 10.5, 11.0]
+
+    def places(name: str, number: str, in_pause: Sequence[list[Pose]]) -> list[Optional[list[float]]]:
+        poses = iter([[stays, old]] * 3 + [*in_pause] + [in_pause[-1]] * 2)
+        traffic = Recorded(tmp_path / name, moments, lambda _: next(poses)).traffic
+        found = [traffic.at(1, time) for time in (9.75, 10.0, 10.25, 11.0)]
+        return [
+            None if others is None else [round(other.longitude, 6) for other in others if other.name == number]
+            for others in found
+        ]
+
+    assert places("moved.bag", "2", [[stays, new]] * 2) == [[1.0], None, [1.0003], [1.0003]]
+    assert places("added.bag", "3", [[stays, old, further]] * 2) == [[], None, [2.0], [2.0]]
+    assert places("gone.bag", "2", [[stays, NOWHERE]] * 2) == [[1.0], None, [], []]
+    assert places("back.bag", "2", [[stays, new], [stays, old]]) == [[1.0], None, [1.0], [1.0]]
+    assert places("still.bag", "2", [[stays, old]] * 2) == [[1.0]] * 4
 
 
 def test_a_flight_without_them_says_that_nothing_is_known(tmp_path: Path) -> None:
