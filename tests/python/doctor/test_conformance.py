@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -16,6 +17,7 @@ import pytest
 
 from support.again import again_until
 from support.deadlines import PROGRAM_S, WAIT_S
+from support.nodes.forked_emulator import ForkedEmulator
 from support.simulator.fake_xplane import FakeXPlane
 from xplane_bridge import protocol, xplane_names
 from xplane_bridge.cli import xplane_doctor
@@ -77,24 +79,18 @@ ATTEMPTS = 4
 
 
 def emulator_options(id_, switched, version):
-    words = ["--version", version, "--port", "0", "--bind", "127.0.0.1", "--no-beacon", "--priority", "normal"]
-    return [*words, "--fps", str(FPS), *OPTIONS.get(id_, []), *(["--otherwise", id_] if switched else [])]
+    words = ["--version", version, "--priority", "normal", "--fps", str(FPS)]
+    return [*words, *OPTIONS.get(id_, []), *(["--otherwise", id_] if switched else [])]
 
 
 @contextlib.contextmanager
 def emulator(*options, ended=None):
     """An emulator in real time; gives its port. What it says of itself at its end is added to `ended`."""
-    command = [sys.executable, program("xplane_emulator"), *options]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
-        try:
-            ready = process.stdout.readline()
-            assert ready.startswith("READY"), ready
-            yield json.loads(ready.split(" ", 1)[1])["port"]
-        finally:
-            process.terminate()
-            said = process.stdout.read()
+    with tempfile.TemporaryDirectory() as folder:
+        with ForkedEmulator(Path(folder), options) as process:
+            yield process.port
         if ended is not None:
-            ended.append(json.loads(said.rpartition("STOPPED ")[2]))
+            ended.append(json.loads(process.output().rpartition("STOPPED ")[2]))
 
 
 def doctor(port, home, *words, command=DOCTOR):
@@ -223,7 +219,7 @@ def test_a_question_alone_finds_its_switch(asked, case):
 
 
 def test_version_11_cannot_show_what_only_12_has(tmp_path):
-    with emulator("--version", "11", "--port", "0", "--bind", "127.0.0.1", "--no-beacon") as port:
+    with emulator("--version", "11") as port:
         words = "--yes", "--only", "vehs,fcon-acts"
         code, out, err = again_until(lambda done: done[0] == 0, lambda: doctor(port, tmp_path, *words))
     assert code == 0, err
