@@ -35,6 +35,10 @@ std::chrono::nanoseconds seconds(double value) {
   return std::chrono::nanoseconds(static_cast<std::int64_t>(value * 1e9));
 }
 
+bool contains(const std::vector<xcb_window_t>& windows, xcb_window_t window) {
+  return std::find(windows.begin(), windows.end(), window) != windows.end();
+}
+
 }  // namespace
 
 class X11WindowSource::Impl {
@@ -215,6 +219,8 @@ class X11WindowSource::Impl {
     X11Connection::Found found;
     found.window = connection_->root();
     if (options_.region.empty()) found = connection_->findWindow(options_);
+    // Of a window that is still there, its size and its number from the left may have changed meanwhile.
+    if (contains(found.alike, chosen_)) found.window = chosen_;
     if (found.window.has_value() && wasBeside(*found.window)) {
       problem_ = wanted_ + " is hidden or closed (" + hex(chosen_) + "); " + hex(*found.window) +
                  " was there beside it and is not taken in its place: show it again, or start anew";
@@ -236,9 +242,7 @@ class X11WindowSource::Impl {
   }
 
   // Where one of several windows alike goes, numbers and sizes choose another, which shows another view.
-  [[nodiscard]] bool wasBeside(xcb_window_t window) const {
-    return window != chosen_ && std::find(alike_.begin(), alike_.end(), window) != alike_.end();
-  }
+  [[nodiscard]] bool wasBeside(xcb_window_t window) const { return window != chosen_ && contains(alike_, window); }
 
   bool open(xcb_window_t window) {
     const std::uint32_t events = XCB_EVENT_MASK_STRUCTURE_NOTIFY | XCB_EVENT_MASK_VISIBILITY_CHANGE;

@@ -9,6 +9,8 @@ from xplane_bridge.errors import XplaneBridgeError
 
 #: Titles of X-Plane's window, exactly: up to early 12, and since.
 TITLES = ("X-System", "X-Plane")
+#: The problem where all windows that fit are so.
+MINIMISED = "X-Plane's window is minimised: it has no picture"
 
 #: Takes a picture (rows x columns x 4 of BGRX, the taker's own), when it was seen, by time.perf_counter_ns [ns], and
 #: for how long before that the window had not been looked at [ns]: it may have appeared so much earlier. 0 where the
@@ -25,6 +27,11 @@ W = TypeVar("W")
 
 class GrabError(XplaneBridgeError):
     """Windows cannot be read on this computer."""
+
+
+def is_xplane(program: str) -> bool:
+    """Whether a program, its file's name or path, is X-Plane (X-Plane 12.exe, X-Plane-x86_64), not a browser."""
+    return program.replace("/", "\\").rsplit("\\", 1)[-1].lower().startswith("x-plane")
 
 
 class Grabber:
@@ -74,13 +81,15 @@ class Grabber:
     def _chosen(self, windows: Sequence[Tuple[Rect, W]]) -> Optional[W]:
         """The window that is asked for, of those that fit; says why there is none, and that there are several.
 
-        Where one of several goes, numbers and sizes choose another, which shows another view: that is not taken.
+        The one that was taken is taken again, wherever it is by now and whatever its size. Where it goes, numbers and
+        sizes choose another of several, which shows another view: that is not taken.
         """
-        found = self._fitting(windows)
+        known = [window for _, window in windows if self._number_of(window) == self._taken]
+        found = known[0] if known else self._fitting(windows)
         if found is None:
             return None
         number = self._number_of(found)
-        if number != self._taken and number in self._beside:
+        if not known and number in self._beside:
             self.problem = (
                 "the window that was captured is hidden or closed, and another that was there beside it is not taken "
                 "in its place: show it again, or start anew"

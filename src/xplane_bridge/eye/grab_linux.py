@@ -14,7 +14,7 @@ from typing import Any, List, NoReturn, Optional, Tuple
 import numpy as np
 
 from xplane_bridge.doctor.observe import windows
-from xplane_bridge.eye.grab import Grabber, GrabError, Rect, Take, Which
+from xplane_bridge.eye.grab import MINIMISED, Grabber, GrabError, Rect, Take, Which, is_xplane
 
 _SEARCH_S = 0.5
 _POLL_S = 0.002
@@ -22,6 +22,7 @@ _POLL_S = 0.002
 _REST = 0.5
 _LONGEST_REST_S = 0.02
 _ROWS = 16
+_BGRX = 0xFF0000, 0xFF00, 0xFF  #: where red, green and blue are in a pixel
 _Z_PIXMAP, _ALL_PLANES = 2, ctypes.c_ulong(-1)
 _IPC_PRIVATE, _IPC_CREAT, _IPC_RMID = 0, 0o1000, 0
 _NO_ADDRESS = ctypes.c_void_p(-1).value
@@ -65,9 +66,12 @@ class _SharedImage:
         if not self._image:
             raise GrabError("the X server shares no memory (MIT-SHM): is the display on another computer?")
         head = windows.Image.from_address(self._image)
-        if head.bits_per_pixel != 32 or head.byte_order != 0:
+        masks = head.red_mask, head.green_mask, head.blue_mask
+        if head.bits_per_pixel != 32 or head.byte_order != 0 or masks != _BGRX:
+            given = f"{head.depth}-bit colour in {head.bits_per_pixel} bits a pixel"
+            x11.XDestroyImage(self._image)
             raise GrabError(
-                f"the display has pixels of {head.bits_per_pixel} bits; expected 32: set it to 24-bit colour"
+                f"the display has {given}; expected bytes of blue, green, red and nothing: set it to 24-bit colour"
             )
         length = head.bytes_per_line * head.height
         self._segment.shmid = self._libc.shmget(_IPC_PRIVATE, ctypes.c_size_t(length), _IPC_CREAT | 0o600)
@@ -180,12 +184,14 @@ class LinuxGrabber(Grabber):
 
     def _find(self) -> Optional[windows.Window]:
         seen = windows.observe(self._name, lambda _: False)
-        fitting = [window for window in seen.windows if window.title in self._titles]
+        alike = [window for window in seen.windows if window.title in self._titles]
+        # A file manager in X-Plane's folder may have its title. A window of another computer says no program.
+        fitting = [window for window in alike if is_xplane(window.program)] or alike
         shown = [window for window in fitting if window.shown]
         if shown:
             return self._chosen([(self._place(window), window) for window in shown])
         self.problem = (
-            "X-Plane's window is minimised: it has no picture"
+            MINIMISED
             if fitting
             else seen.error or self._no_window(tuple(dict.fromkeys(window.title for window in seen.windows)))
         )

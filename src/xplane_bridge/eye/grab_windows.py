@@ -14,7 +14,7 @@ from typing import Any, List, Optional, Tuple
 
 import numpy as np
 
-from xplane_bridge.eye.grab import Grabber, GrabError, Rect, Take, Which
+from xplane_bridge.eye.grab import MINIMISED, Grabber, GrabError, Rect, Take, Which, is_xplane
 
 _SEARCH_S = 0.5
 _CHECK_S = 0.25
@@ -38,11 +38,6 @@ class _Rect(ctypes.Structure):
 
 class _Point(ctypes.Structure):
     _fields_ = (("x", ctypes.c_long), ("y", ctypes.c_long))
-
-
-def is_xplane(image: str) -> bool:
-    """Whether the path of a program's file is that of X-Plane (X-Plane.exe, X-Plane 12.exe), not of a browser."""
-    return image.replace("/", "\\").rsplit("\\", 1)[-1].lower().startswith("x-plane")
 
 
 def client_area(
@@ -162,13 +157,16 @@ class WindowsGrabber(Grabber):
         windows = self._desktop.windows()
         fitting = [window for window, title in windows if title in self._titles]
         own = [window for window in fitting if is_xplane(self._desktop.program_of(window))]
+        # Windows has minimised ones far left of every screen: they would come first by number.
+        shown = [window for window in own if not self._desktop.minimised(window)]
+        if shown:
+            return self._chosen([(self._desktop.place(window), window) for window in shown])
         if own:
-            return self._chosen([(self._desktop.place(window), window) for window in own])
-        self.problem = (
-            "a window has X-Plane's title but belongs to another program"
-            if fitting
-            else self._no_window(tuple(title for _, title in windows))
-        )
+            self.problem = MINIMISED
+        elif fitting:
+            self.problem = "a window has X-Plane's title but belongs to another program"
+        else:
+            self.problem = self._no_window(tuple(title for _, title in windows))
         return None
 
     def _capture(self, window: int) -> None:
@@ -197,8 +195,7 @@ class WindowsGrabber(Grabber):
         control = self._started(window, on_frame_arrived, on_closed)
         try:
             while not closed and not self._stop.wait(_CHECK_S) and not control.is_finished():
-                minimised = self._desktop.minimised(window)
-                self.problem = "X-Plane's window is minimised: it has no picture" if minimised else ""
+                self.problem = MINIMISED if self._desktop.minimised(window) else ""
         finally:
             control.stop()
         if not closed and not self._stop.is_set():

@@ -107,6 +107,32 @@ TEST_F(X11WindowSourceTest, OfWindowsAlikeNoneTakesThePlaceOfAnother) {
   }
 }
 
+TEST_F(X11WindowSourceTest, OfWindowsAlikeTheCapturedOneStaysWhateverItsSizeBecomes) {
+  TestWindow notes(server_.display(), "notes", 100, 80);  // a server that its last client leaves begins anew
+  for (const int index : {0, -1}) {
+    TestWindow captured(server_.display(), "X-System", 320, 240, 10, 20);
+    TestWindow other(server_.display(), "X-System", 200, 160, 400, 0);
+    captured.fill(0xff0000);
+    X11SourceOptions options = titled(server_, "");
+    options.index = index;
+    options.use_composite = false;
+    X11WindowSource source(options, steadyNow);
+    ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
+    ASSERT_EQ(source.window(), captured.id());
+    Change change;
+    captured.fill(0x00ff00);
+    while (source.waitChange(kShort, change) != WaitResult::kChange) {
+    }
+    captured.resize(100, 80);  // when its pixels are about to be read
+    captured.move(600, 300);
+    EXPECT_EQ(source.grab(change, picture_), GrabResult::kLost);
+    captured.fill(0x0000ff);
+    ASSERT_TRUE(nextPicture(source, picture_)) << source.problem();
+    EXPECT_EQ(source.window(), captured.id());
+    EXPECT_EQ(picture_.bgr.size(), cv::Size(100, 80));
+  }
+}
+
 TEST_F(X11WindowSourceTest, OfWindowsAlikeThePointChoosesTheOneThatCoversIt) {
   TestWindow right(server_.display(), "X-System", 320, 240, 400, 0);
   TestWindow left(server_.display(), "X-System", 100, 80, 10, 20);

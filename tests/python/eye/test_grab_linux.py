@@ -9,11 +9,12 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any, Callable, Iterator, List, Set, Tuple
+from typing import Any, Callable, Iterator, List, Optional, Set, Tuple
 
 import pytest
 
-from xplane_bridge.eye import grab_linux
+from xplane_bridge.doctor.observe.windows import Display, Window
+from xplane_bridge.eye import grab, grab_linux
 from xplane_bridge.eye.grab_linux import LinuxGrabber
 from xplane_bridge.harness import wait_until
 from xplane_bridge.harness.display import VirtualDisplay
@@ -182,3 +183,56 @@ def test_a_window_that_grows_is_not_sent_by_its_upper_left_part(display: str):
                 assert shapes_from_now_on(pictures) == {(height, width, 4)}
         finally:
             grabber.stop()
+
+
+class OtherColours:
+    """Xext of a display whose colours have other numbers of bits."""
+
+    def __init__(self, xext: Any, depth: int, masks: Tuple[int, int, int]) -> None:
+        self._xext, self._depth, self._masks = xext, depth, masks
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._xext, name)
+
+    def XShmCreateImage(self, *arguments: Any) -> Any:  # noqa: N802 - Xext's name
+        image = self._xext.XShmCreateImage(*arguments)
+        head = grab_linux.windows.Image.from_address(image)
+        head.depth, (head.red_mask, head.green_mask, head.blue_mask) = self._depth, self._masks
+        return image
+
+
+@pytest.mark.parametrize(
+    ("depth", "masks"), [(30, (0x3FF00000, 0xFFC00, 0x3FF)), (24, (0xFF, 0xFF00, 0xFF0000))], ids=["deep", "RGBX"]
+)
+def test_a_display_of_other_colours_is_said_and_nothing_sent(display: str, depth: int, masks: Tuple[int, int, int]):
+    pictures: List[Tuple[int, ...]] = []
+    with window(display) as move:
+        move("320x240+100+50")
+        grabber = LinuxGrabber(("X-Plane",), None, lambda pixels, *_: pictures.append(pixels.shape))
+        grabber._xext = OtherColours(grabber._xext, depth, masks)
+        said = problem_of(grabber)
+    assert said.startswith(f"the display has {depth}-bit colour in 32 bits a pixel; expected bytes of blue, ")
+    assert not pictures
+
+
+SMALL, LARGE = (640, 480, True), (1280, 900, True)  #: width, height [px], shown
+
+
+@pytest.mark.parametrize(
+    ("windows", "found", "problem"),
+    [
+        ([("nautilus", LARGE), ("X-Plane-x86_64", SMALL)], 1, ""),
+        ([("nautilus", LARGE), ("X-Plane-x86_64", (640, 480, False))], None, grab.MINIMISED),
+        ([("", LARGE), ("", SMALL)], 0, ""),  # of another computer
+        ([("nautilus", SMALL), ("", LARGE)], 1, ""),
+    ],
+)
+def test_of_windows_alike_that_of_x_planes_own_process_is_taken(
+    display: str, monkeypatch: pytest.MonkeyPatch, windows: list, found: Optional[int], problem: str
+):
+    seen = [Window("X-Plane", *of, program=program, number=k) for k, (program, of) in enumerate(windows)]
+    monkeypatch.setattr(grab_linux.windows, "observe", lambda *_: Display(display, tuple(seen)))
+    grabber = LinuxGrabber(("X-Plane",), None, lambda *_: None)
+    grabber.problem = ""
+    assert grabber._find() == (None if found is None else seen[found])
+    assert grabber.problem == problem

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from support.kept_problems import KeptProblems
-from xplane_bridge.eye import grab_windows
+from xplane_bridge.eye import grab, grab_windows
 from xplane_bridge.eye.grab_windows import WindowsGrabber
 from xplane_bridge.harness import wait_until
 
@@ -152,3 +152,38 @@ def test_a_capture_that_fails_is_said_and_begun_again(
     assert Capture.started == started
     reasons = list(dict.fromkeys(filter(None, grabber.problems[1:])))
     assert reasons == ([f"Windows gives no pictures of X-Plane's window: {reason}"] if reason else [])
+
+
+MINIMISED_PLACE = -32000, -32000, 160, 28  #: where GetWindowRect says that it is
+
+
+@pytest.mark.parametrize(
+    ("minimised", "which", "found", "problem"),
+    [
+        ((), 0, 7, ""),
+        ((), 1, 8, ""),
+        ((8,), 0, 7, ""),
+        ((8,), 1, None, "there is no window number 1: 1 are alike, counted from 0"),
+        ((7,), None, 8, ""),
+        ((7, 8), 0, None, grab.MINIMISED),
+    ],
+)
+def test_a_minimised_window_is_not_the_leftmost(
+    monkeypatch: pytest.MonkeyPatch, minimised: tuple, which: Any, found: Any, problem: str
+):
+    class Two(Desktop):
+        def windows(self) -> list:
+            return [(7, "X-Plane"), (8, "X-Plane")]
+
+        def minimised(self, window: int) -> bool:
+            return window in minimised
+
+        def place(self, window: int) -> tuple:
+            return MINIMISED_PLACE if window in minimised else (1920 * (window - 7), 0, 1920, 1080)
+
+    monkeypatch.setitem(sys.modules, "windows_capture", types.SimpleNamespace())
+    monkeypatch.setattr(grab_windows, "_Desktop", Two)
+    grabber = WindowsGrabber(("X-Plane",), which, lambda *_: None)
+    grabber.problem = ""
+    assert grabber._find() == found
+    assert grabber.problem == problem

@@ -12,8 +12,8 @@ import pytest
 
 from support.absent_modules import WITHOUT_THEM
 from support.deadlines import PROGRAM_S
-from xplane_bridge.eye.grab import Grabber
-from xplane_bridge.eye.grab_windows import client_area, is_xplane
+from xplane_bridge.eye.grab import Grabber, is_xplane
+from xplane_bridge.eye.grab_windows import client_area
 
 START = f"""{WITHOUT_THEM}
 for module in ("grab_linux", "grab_windows", "grab_macos"):
@@ -94,6 +94,7 @@ def test_the_title_bar_is_not_in_the_picture():
     [
         ("C:\\X-Plane 12\\X-Plane.exe", True),
         ("D:/Games/X-Plane 11/X-Plane 11.exe", True),
+        ("X-Plane-x86_64", True),
         ("C:\\Program Files\\Firefox\\firefox.exe", False),
         ("C:\\X-Plane 12\\Resources\\browser.exe", False),
         ("", False),
@@ -138,6 +139,13 @@ def test_of_windows_alike_none_takes_the_place_of_another(which: Optional[int]):
     assert windows.problem.startswith("the window that was captured is hidden or closed, and another")
     assert windows.choose(((5, 5, 900, 600), "large"), BELOW) == "large"
     assert windows.choose(((0, 0, 900, 600), "opened anew"), BELOW) == "opened anew"
+
+
+@pytest.mark.parametrize("which", [0, None, (10, 20)])
+def test_the_window_that_is_captured_stays_it_when_it_is_moved_or_made_smaller(which: object):
+    windows = Windows((), which, lambda *_: None)  # type: ignore[arg-type]
+    assert windows.choose(((0, 0, 900, 600), "first"), BELOW) == "first"
+    assert windows.choose(((1500, 400, 90, 60), "first"), ((0, 0, 640, 480), "below")) == "first"
 
 
 def test_of_windows_alike_a_point_of_the_screen_chooses_the_one_there():

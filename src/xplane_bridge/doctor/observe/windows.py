@@ -75,6 +75,9 @@ class Image(ctypes.Structure):
         ("depth", ctypes.c_int),
         ("bytes_per_line", ctypes.c_int),
         ("bits_per_pixel", ctypes.c_int),
+        ("red_mask", ctypes.c_ulong),
+        ("green_mask", ctypes.c_ulong),
+        ("blue_mask", ctypes.c_ulong),
     )
 
 
