@@ -25,8 +25,9 @@ constexpr std::uint32_t kBorderline = 1;
 constexpr std::uint32_t kDelayAssumed = 2;
 constexpr std::uint16_t kCalibrates = 1;  // of a hello's abilities
 constexpr int kSmallestSide = 16;
-constexpr int kLargestSide = 8192;
-constexpr double kLongestDelay = 1.0;  // [s]
+constexpr int kLargestSide = 65500;                // of a JPEG, as libjpeg takes it
+constexpr std::int64_t kMostPixels = 8192 * 8192;  // 200 MB when decoded
+constexpr double kLongestDelay = 1.0;              // [s]
 
 template <typename T>
 T get(const std::uint8_t* bytes) {
@@ -182,13 +183,18 @@ std::optional<SentMessage> PictureStreamReader::readPicture(const std::uint8_t* 
   picture.change_ns = getSigned(header + 24);
   picture.sent_ns = getSigned(header + 40);
   picture.delay = getDouble(header + 48);
+  const std::string size = std::to_string(picture.width) + "x" + std::to_string(picture.height);
   const auto sideFits = [](int side) { return side >= kSmallestSide && side <= kLargestSide; };
-  const auto size = jpegSize(body, lengths.body);
-  if (!std::isfinite(picture.key) || !(std::abs(picture.delay) <= kLongestDelay) || !sideFits(picture.width) ||
-      !sideFits(picture.height) || size != std::make_pair(picture.width, picture.height)) {
-    refuse(StreamFault::kMalformed, "a picture said to be " + std::to_string(picture.width) + "x" +
-                                        std::to_string(picture.height) +
-                                        " is another JPEG or none, or its numbers make no sense");
+  if (!sideFits(picture.width) || !sideFits(picture.height) ||
+      std::int64_t{picture.width} * picture.height > kMostPixels) {
+    refuse(StreamFault::kMalformed, "a picture of " + size + "; expected sides of 16 to 65500 px and at most " +
+                                        std::to_string(kMostPixels) + " pixels");
+    return std::nullopt;
+  }
+  if (!std::isfinite(picture.key) || !(std::abs(picture.delay) <= kLongestDelay) ||
+      jpegSize(body, lengths.body) != std::make_pair(picture.width, picture.height)) {
+    refuse(StreamFault::kMalformed,
+           "a picture said to be " + size + " is another JPEG or none, or its numbers make no sense");
     return std::nullopt;
   }
   picture.jpeg.assign(body, body + lengths.body);

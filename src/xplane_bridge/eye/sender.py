@@ -58,6 +58,7 @@ class Sender:
         self._lock = threading.Lock()
         self._next: Optional[Decision] = None
         self._problem = ""
+        self._unsendable = ""  # why the newest picture cannot be sent
         self._stop = False
         # Windows waits for sockets only: a pair of them wakes the thread.
         self._waker, self._awake = socket.socketpair()
@@ -188,7 +189,8 @@ class _Session:
                 self._send_newest()
                 if time.monotonic() - last_status_s >= _STATUS_S and self._welcome:
                     last_status_s = time.monotonic()
-                    self._connection.sendall(wire.encode_status(self._sender._window, self._sender._problem))
+                    problem = self._sender._problem or self._sender._unsendable
+                    self._connection.sendall(wire.encode_status(self._sender._window, problem))
         except OSError as error:
             if self._welcome:
                 raise _WelcomedError(error.strerror or str(error)) from None
@@ -234,10 +236,19 @@ class _Session:
             return
         with self._sender._lock:
             decision, self._sender._next = self._sender._next, None
-        if decision is not None:
-            self._connection.sendall(self._message(decision))
-            self._credit -= 1
-            self._sender.sent += 1
+        if decision is None:
+            return
+        try:
+            message = self._message(decision)
+        except wire.WireError as error:  # one of another size may follow
+            if not self._sender._unsendable:
+                self._sender._say(str(error))
+            self._sender._unsendable = str(error)
+            return
+        self._sender._unsendable = ""
+        self._connection.sendall(message)
+        self._credit -= 1
+        self._sender.sent += 1
 
     def _message(self, decision: Decision) -> bytes:
         pixels: Any = decision.picture

@@ -17,6 +17,9 @@ from typing import List, Tuple
 
 VERSION = 1
 MOST_BODY = 16 * 1024 * 1024
+#: Sides of a picture [px], which libjpeg bounds, and its size [pixels], 200 MB when `capture_node` decodes it.
+LEAST_SIDE, MOST_SIDE = 16, 65500
+MOST_PIXELS = 8192 * 8192
 #: Longest token, name of an X-Plane and status text [bytes].
 MOST_TEXT = 512
 #: Bits of `PictureHeader.flags`: it may be the neighbouring frame's picture; the delay is not measured.
@@ -107,10 +110,19 @@ def encode_picture(window: int, header: PictureHeader, jpeg: bytes) -> bytes:
     """A picture.
 
     Raises:
-        WireError: It is larger than MOST_BODY, or a side is no number of 16 bits.
+        WireError: It is larger than MOST_BODY, or has another size than `capture_node` takes.
     """
-    if not (0 < header.width < 65536 and 0 < header.height < 65536):
-        raise WireError(f"a picture of {header.width}x{header.height}; expected sides of 1..65535")
+    sides = header.width, header.height
+    if min(sides) < LEAST_SIDE or max(sides) > MOST_SIDE or header.width * header.height > MOST_PIXELS:
+        raise WireError(
+            f"X-Plane's window has {header.width}x{header.height} px; expected sides of {LEAST_SIDE} to {MOST_SIDE} px "
+            f"and at most {MOST_PIXELS} pixels: give it another size"
+        )
+    if len(jpeg) > MOST_BODY:
+        raise WireError(
+            f"the picture is a JPEG of {len(jpeg)} bytes; at most {MOST_BODY} can be sent: give a lower --quality or "
+            "make X-Plane's window smaller"
+        )
     packed = _PICTURE_HEADER.pack(
         _PICTURE,
         window,
@@ -152,8 +164,6 @@ def _text(text: str, what: str) -> bytes:
 
 
 def _message(header: bytes, body: bytes) -> bytes:
-    if len(body) > MOST_BODY:
-        raise WireError(f"a body of {len(body)} bytes; at most {MOST_BODY} can be sent")
     return _PREFIX.pack(_MAGIC, VERSION, len(header), len(body), zlib.crc32(header)) + header + body
 
 

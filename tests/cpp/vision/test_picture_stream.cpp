@@ -26,14 +26,20 @@ Bytes golden(const std::string& name) {
   return bytes;
 }
 
-/// The start of a JPEG of 640 x 480 as encoders write it: SOI, APP0 of 16 bytes, SOF0.
-Bytes jpegOf640x480() {
+/// The start of a JPEG as encoders write it: SOI, APP0 of 16 bytes, SOF0.
+Bytes jpegOf(int width, int height) {
   Bytes bytes{0xFF, 0xD8, 0xFF, 0xE0, 0x00, 0x10};
   bytes.resize(bytes.size() + 14, 0x00);
-  const Bytes frame{0xFF, 0xC0, 0x00, 0x11, 0x08, 0x01, 0xE0, 0x02, 0x80, 0x03};
-  bytes.insert(bytes.end(), frame.begin(), frame.end());
+  bytes.insert(bytes.end(), {0xFF, 0xC0, 0x00, 0x11, 0x08});
+  for (const int side : {height, width}) {
+    bytes.push_back(static_cast<std::uint8_t>(side >> 8));
+    bytes.push_back(static_cast<std::uint8_t>(side));
+  }
+  bytes.push_back(0x03);
   return bytes;
 }
+
+Bytes jpegOf640x480() { return jpegOf(640, 480); }
 
 /// The golden picture with another body: only the prefix says how long that is.
 Bytes pictureWith(const Bytes& body) {
@@ -41,6 +47,24 @@ Bytes pictureWith(const Bytes& body) {
   bytes.resize(16 + 64);
   for (std::size_t i = 0; i < 4; ++i) bytes[8 + i] = static_cast<std::uint8_t>(body.size() >> (8 * i));
   bytes.insert(bytes.end(), body.begin(), body.end());
+  return bytes;
+}
+
+/// The golden picture with another size, in its header and in its JPEG.
+Bytes pictureOf(int width, int height) {
+  Bytes bytes = pictureWith(jpegOf(width, height));
+  const auto put = [&bytes](std::size_t at, std::uint32_t value, std::size_t size) {
+    for (std::size_t i = 0; i < size; ++i) bytes[at + i] = static_cast<std::uint8_t>(value >> (8 * i));
+  };
+  put(16 + 4, static_cast<std::uint32_t>(width), 2);
+  put(16 + 6, static_cast<std::uint32_t>(height), 2);
+  std::uint32_t crc = 0xFFFFFFFFU;  // CRC-32 of the header, bit by bit
+  for (std::size_t i = 16; i < 16 + 64; ++i) {
+    for (int bit = 0; bit < 8; ++bit) {
+      crc = (crc >> 1U) ^ (((crc ^ (std::uint32_t{bytes[i]} >> bit)) & 1U) != 0U ? 0xEDB88320U : 0U);
+    }
+  }
+  put(12, ~crc, 4);
   return bytes;
 }
 
@@ -151,6 +175,25 @@ TEST(PictureStream, AJpegOfAnotherSizeIsRefused) {
     auto reader = fed(pictureWith(body));
     EXPECT_FALSE(reader.next().has_value());
     EXPECT_EQ(reader.fault(), StreamFault::kMalformed);
+  }
+}
+
+TEST(PictureStream, SizesAreTakenUpToWhatCanBeDecoded) {
+  // Three 4K monitors side by side are 11520x2160.
+  for (const auto& [width, height] :
+       {std::make_pair(16, 16), std::make_pair(11520, 2160), std::make_pair(8192, 8192), std::make_pair(65500, 1024)}) {
+    auto reader = fed(pictureOf(width, height));
+    const auto message = reader.next();
+    ASSERT_TRUE(message.has_value()) << reader.problem();
+    EXPECT_EQ(std::get<vision::SentPicture>(*message).width, width);
+    EXPECT_EQ(std::get<vision::SentPicture>(*message).height, height);
+  }
+  for (const auto& [width, height] :
+       {std::make_pair(15, 480), std::make_pair(8193, 8192), std::make_pair(65501, 480)}) {
+    auto reader = fed(pictureOf(width, height));
+    EXPECT_FALSE(reader.next().has_value());
+    EXPECT_EQ(reader.problem(), "a picture of " + std::to_string(width) + "x" + std::to_string(height) +
+                                    "; expected sides of 16 to 65500 px and at most 67108864 pixels");
   }
 }
 

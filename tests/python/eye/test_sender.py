@@ -71,8 +71,8 @@ def receiver() -> Iterator[Receiver]:
         one.connection.close()
 
 
-def picture(index: int) -> Decision:
-    pixels = np.full((48, 64, 4), index % 256, np.uint8)
+def picture(index: int, rows: int = 48) -> Decision:
+    pixels = np.full((rows, 64, 4), index % 256, np.uint8)
     return Decision(pixels, 1000, Frame(900, float(index), index), 0.0, 0.0, 0)
 
 
@@ -154,6 +154,20 @@ def test_a_status_reports_why_there_are_no_pictures(receiver: Receiver):
         receiver.accept()
         receiver.reply(WELCOME)
         assert receiver.message(STATUS)[1] == b"no window"
+
+
+def test_a_window_of_a_size_that_cannot_be_sent_is_reported_and_its_next_size_sent(receiver: Receiver):
+    said: list = []
+    with start(receiver, said) as eye:
+        receiver.accept()
+        receiver.reply(WELCOME)
+        eye.offer(picture(1, rows=15))
+        reason = "X-Plane's window has 64x15 px; expected sides of 16 to"
+        wait_until(lambda: receiver.message(STATUS)[1].startswith(reason.encode()), 10.0, "the reason")
+        assert any(line.startswith(reason) for line in said)
+        eye.offer(picture(2))
+        assert receiver.picture_index() == 2
+        assert receiver.message(STATUS)[1] == b""
 
 
 def test_a_request_is_handed_over_once_and_answered_by_its_number(receiver: Receiver):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import struct
 from pathlib import Path
 
@@ -42,8 +43,27 @@ def test_what_no_receiver_would_take_is_not_sent():
         wire.encode_picture(0, HEADER, bytes(wire.MOST_BODY + 1))
     with pytest.raises(wire.WireError, match="the token has 513 bytes"):
         wire.encode_hello(0, "x" * 513, "")
-    with pytest.raises(wire.WireError, match="70000x480"):
-        wire.encode_picture(0, wire.PictureHeader(70000, 480, 0.0, 0, 0, 0, 0, 0, 0.0, 0.0), b"")
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "sent"),
+    [
+        (16, 16, True),
+        (11520, 2160, True),
+        (8192, 8192, True),
+        (65500, 1024, True),
+        (15, 480, False),
+        (8193, 8192, False),
+        (65501, 480, False),
+    ],
+)
+def test_pictures_are_sent_of_the_sizes_that_capture_node_takes(width: int, height: int, sent: bool):
+    header = dataclasses.replace(HEADER, width=width, height=height)
+    if sent:
+        assert struct.unpack_from("<HH", wire.encode_picture(0, header, b"JPEG"), 20) == (width, height)
+    else:
+        with pytest.raises(wire.WireError, match=f"{width}x{height} px; expected sides of 16 to 65500 px and at most"):
+            wire.encode_picture(0, header, b"JPEG")
 
 
 def test_a_long_status_is_cut_between_two_characters():
