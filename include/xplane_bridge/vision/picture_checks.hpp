@@ -19,28 +19,36 @@ namespace xplane_bridge::vision {
 /// Notices a picture that stands still while the aircraft moves. Pure bookkeeping; times are the caller's.
 class FrozenCheck {
  public:
-  /// @param after_ns [ns] how long the picture must have stood still, > 0
+  /// @param after_ns [ns] for how long the picture must have stood still while the state moved, > 0
   explicit FrozenCheck(std::int64_t after_ns) : after_ns_(after_ns) {}
 
   /// The picture changed.
-  void pictureChanged(std::int64_t now_ns) { standing_since_ns_ = now_ns; }
+  void pictureChanged() {
+    looked_at_ = true;
+    moving_since_ns_.reset();
+  }
 
-  /// No pictures are looked at for now: nothing is known of them until the next.
-  void interrupt() { standing_since_ns_ = 0; }
+  /// No pictures are looked at for now, or there are none: nothing is known of them until the next.
+  void interrupt() { looked_at_ = false; }
 
   /// The flight state moved (attitude or position clearly different from before).
-  void stateMoved(std::int64_t now_ns) { moved_at_ns_ = now_ns; }
+  void stateMoved(std::int64_t now_ns) {
+    // After a pause, the first state that moves comes before the first picture that does.
+    if (!moving_since_ns_ || now_ns - moved_at_ns_ >= after_ns_) moving_since_ns_ = now_ns;
+    moved_at_ns_ = now_ns;
+  }
 
-  /// True when the picture has stood still for longer than the limit and the state moved within that time.
+  /// True when the state has moved for longer than the limit, and still moves, while the picture stood still.
   [[nodiscard]] bool frozen(std::int64_t now_ns) const {
-    return standing_since_ns_ != 0 && now_ns - standing_since_ns_ > after_ns_ && moved_at_ns_ != 0 &&
-           moved_at_ns_ > standing_since_ns_ && now_ns - moved_at_ns_ < after_ns_;
+    return looked_at_ && moving_since_ns_ && now_ns - *moving_since_ns_ > after_ns_ &&
+           now_ns - moved_at_ns_ < after_ns_;
   }
 
  private:
   std::int64_t after_ns_;
-  std::int64_t standing_since_ns_ = 0;  // 0: no picture yet
-  std::int64_t moved_at_ns_ = 0;        // 0: never
+  bool looked_at_ = false;
+  std::optional<std::int64_t> moving_since_ns_;  // without a pause since the picture last changed
+  std::int64_t moved_at_ns_ = 0;
 };
 
 /// Finds out when a picture that stands, as in a pause, has to be shown to those who came after its last change: once,

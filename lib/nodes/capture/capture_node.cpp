@@ -162,7 +162,10 @@ void CaptureNode::noteSource(const vision::FrameSource& source, bool described) 
   }
   const std::lock_guard<std::mutex> lock(capture_mutex_);
   source_problem_ = problem;
-  if (!problem.empty()) periods_.interrupt();
+  if (!problem.empty()) {
+    periods_.interrupt();
+    frozen_check_.interrupt();
+  }
   // Asking the window for its title costs a round trip; only where it may have changed.
   if (described || source_description_.empty()) source_description_ = source.describe();
 }
@@ -210,7 +213,7 @@ void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change&
   grabbed.display_known = picture.display_time_known;
   {
     const std::lock_guard<std::mutex> lock(capture_mutex_);
-    frozen_check_.pictureChanged(picture.grab_time_ns);
+    frozen_check_.pictureChanged();
     frozen_ = false;
     ++grabbed_;
     reads_.push_back(took);

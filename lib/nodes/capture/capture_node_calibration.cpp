@@ -21,6 +21,8 @@ namespace {
 constexpr double kSettle = 0.7;
 constexpr double kShortestStep = 0.15;
 constexpr double kLongestStep = 0.3;
+constexpr double kStands = 2.0 * kLongestStep;  // a field of view that is no step: the eye's steps are no longer
+constexpr double kStandsWithin = 2.0 * kStands;
 constexpr double kUndoTimeout = 2.0;
 constexpr double kSenderAnswers = 30.0;  // with what it may have to wait for X-Plane to take its field of view back
 
@@ -138,7 +140,7 @@ std::string CaptureNode::calibrateSender() {
   link().waitUntil(answered, kSenderAnswers);
   {
     const std::lock_guard<std::mutex> lock(capture_mutex_);
-    frozen_check_.pictureChanged(pairingNow());
+    frozen_check_.interrupt();
     calibrating_ = false;
   }
   // Not what the eye has seen before its steps, where the node that changed it has ended meanwhile.
@@ -162,12 +164,20 @@ void CaptureNode::refuseWhileRecorded() const {
 
 double CaptureNode::fieldOfViewToChange() {
   double own = std::numeric_limits<double>::quiet_NaN();
-  {
+  // An eye's measurement at its start is in no journal: a step of it is not the user's own.
+  const auto stands = [this, &own] {
     const std::lock_guard<std::mutex> lock(camera_mutex_);
-    if (camera_known_) own = field_of_view_deg_;
-  }
+    own = camera_known_ ? field_of_view_deg_ : std::numeric_limits<double>::quiet_NaN();
+    return !std::isfinite(own) || core::toSeconds(field_of_view_heard_ns_ - field_of_view_since_ns_) >= kStands;
+  };
+  const bool stood = link().waitUntil(stands, kStandsWithin);
   if (!std::isfinite(own)) {
     throw std::runtime_error("X-Plane does not say its field of view: is it heard (link_state)?");
+  }
+  if (!stood) {
+    throw std::runtime_error(
+        "X-Plane's field of view does not stand still: another camera or an xplane_eye measures its delay, or it is "
+        "being changed: call again when it stands");
   }
   if (!options_.set_field_of_view && !link().journal()->orphans(kFieldOfViewPurpose).empty()) {
     throw std::runtime_error(
@@ -221,7 +231,7 @@ void CaptureNode::lookForStep(vision::FrameSource* source, const vision::Change&
   cv::resize(picture.bgr, small, {80, 56}, 0.0, 0.0, cv::INTER_AREA);
   cv::extractChannel(small, grey, 1);
   const std::lock_guard<std::mutex> lock(capture_mutex_);
-  frozen_check_.pictureChanged(picture.grab_time_ns);
+  frozen_check_.pictureChanged();
   ++skipped_;
   if (!step_before_.empty() && picture.display_time_known) {
     cv::absdiff(grey, step_before_, difference);

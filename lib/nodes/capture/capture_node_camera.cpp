@@ -71,8 +71,10 @@ void CaptureNode::onView(const core::RrefView& datagram, const core::ReceiveInfo
   core::FrustumSample frustum = view_stream_.frustum();
   {
     const std::lock_guard<std::mutex> lock(camera_mutex_);
+    if (!camera_known_ || frustum.horizontal_deg != field_of_view_deg_) field_of_view_since_ns_ = receive_ns;
     camera_known_ = true;
     field_of_view_deg_ = frustum.horizontal_deg;
+    field_of_view_heard_ns_ = receive_ns;
     frustum.shift_up = frustum_shift_up_;
     camera.frustum = frustumOf(frustum);
     pose_report_ = pose ? pose_check_.report() : "X-Plane does not answer";

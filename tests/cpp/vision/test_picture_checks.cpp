@@ -64,21 +64,43 @@ TEST(StandingCheck, IsDueOnceForThoseWhoSeeNothingChange) {
   EXPECT_FALSE(check.due(true, 9500)) << "they have seen one";
 }
 
-TEST(FrozenCheck, NeedsAStandingPictureAndAMovingState) {
-  constexpr std::int64_t kSecond = 1'000'000'000;
-  vision::FrozenCheck check(kSecond);
-  EXPECT_FALSE(check.frozen(10 * kSecond));  // no picture yet
-  check.pictureChanged(10 * kSecond);
-  EXPECT_FALSE(check.frozen(12 * kSecond));  // nothing moves: the picture may stand
-  check.stateMoved(12 * kSecond);
-  EXPECT_TRUE(check.frozen(12 * kSecond + 1));
-  check.pictureChanged(12 * kSecond + 2);
-  EXPECT_FALSE(check.frozen(12 * kSecond + 3));
-  check.stateMoved(12 * kSecond + 4);
-  EXPECT_FALSE(check.frozen(12 * kSecond + 5));  // not standing long enough
-  EXPECT_FALSE(check.frozen(14 * kSecond));      // and the state stopped
-  check.stateMoved(14 * kSecond);
-  EXPECT_TRUE(check.frozen(14 * kSecond));
+constexpr std::int64_t kTenth = 100'000'000;  // [ns]
+
+/// A state that moves ten times a second, from `from` to `to` [0.1 s], and no new picture.
+void moveState(vision::FrozenCheck& check, std::int64_t from, std::int64_t to) {
+  for (std::int64_t at = from; at <= to; ++at) check.stateMoved(at * kTenth);
+}
+
+TEST(FrozenCheck, NeedsAPictureThatStandsForTheTimeThatTheStateMoves) {
+  vision::FrozenCheck check(10 * kTenth);
+  moveState(check, 80, 99);
+  EXPECT_FALSE(check.frozen(100 * kTenth)) << "no picture yet";
+  check.pictureChanged();
+  EXPECT_FALSE(check.frozen(120 * kTenth)) << "nothing moves: the picture may stand";
+  moveState(check, 121, 131);
+  EXPECT_FALSE(check.frozen(131 * kTenth)) << "not longer than the limit";
+  EXPECT_TRUE(check.frozen(131 * kTenth + 1));
+  EXPECT_FALSE(check.frozen(141 * kTenth)) << "the state has stopped";
+  moveState(check, 132, 140);
+  EXPECT_TRUE(check.frozen(141 * kTenth));
+  check.pictureChanged();
+  EXPECT_FALSE(check.frozen(141 * kTenth + 1));
+  moveState(check, 142, 150);
+  EXPECT_FALSE(check.frozen(151 * kTenth)) << "not standing long enough";
+  moveState(check, 151, 153);
+  EXPECT_TRUE(check.frozen(153 * kTenth));
   check.interrupt();  // no subscriber
-  EXPECT_FALSE(check.frozen(14 * kSecond));
+  EXPECT_FALSE(check.frozen(153 * kTenth));
+}
+
+TEST(FrozenCheck, AMovementThatHasJustBegunIsNotInThePictureYet) {
+  vision::FrozenCheck check(10 * kTenth);
+  check.pictureChanged();
+  moveState(check, 1, 1);                                          // the last frame before a pause
+  for (std::int64_t resumed = 50; resumed < 250; resumed += 50) {  // or an aircraft that is placed
+    moveState(check, resumed, resumed + 2);
+    EXPECT_FALSE(check.frozen((resumed + 3) * kTenth)) << "after " << resumed;
+  }
+  moveState(check, 300, 311);
+  EXPECT_TRUE(check.frozen(311 * kTenth)) << "it lasts, and the picture still stands";
 }

@@ -345,6 +345,10 @@ def test_a_picture_that_stands_is_an_error_unless_the_aircraft_has_crashed(world
         assert (crashed.level, crashed.message) == (1, "the picture stands still: the aircraft has crashed")
         warnings.publish(WarningState(crashed=0.0))
         world.wait_for_diagnostics("capture", lambda s: s.level == 2, timeout=WAIT_S)
+        still.stop()
+        world.wait_for_diagnostics("capture", lambda s: s.message.startswith("no picture: "), timeout=WAIT_S)
+        with pytest.raises(HarnessError):  # twice the time between repetitions of a picture that stands
+            images.wait_for_next(timeout=2.0)
     finally:
         ended.set()
         mover.join()

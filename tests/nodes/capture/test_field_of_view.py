@@ -170,6 +170,42 @@ def test_one_camera_measures_at_a_time_also_by_its_eye(world) -> None:
         assert not journal_entries(world)
 
 
+@contextlib.contextmanager
+def steps_of_another(wire) -> Iterator[None]:
+    """X-Plane's field of view meanwhile steps as an eye measures at its start, with nothing in the journal."""
+    ended = threading.Event()
+
+    def step() -> None:
+        while not ended.wait(0.25):
+            wire.send(protocol.DrefWrite(FIELD_OF_VIEW, USERS_DEG + 8.0))
+            ended.wait(0.25)
+            wire.send(protocol.DrefWrite(FIELD_OF_VIEW, USERS_DEG))
+
+    stepping = threading.Thread(target=step)
+    stepping.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        stepping.join()
+
+
+def test_a_step_of_an_eyes_own_measurement_is_not_taken_for_the_users(world) -> None:
+    emulator = world.emulator("--fps", FPS)
+    wire = world.wire(emulator.port)
+    node, listen = sender_node(world, emulator.port)
+    with node, silent_eye(listen):
+        with steps_of_another(wire):
+            wait_until(lambda: "does not stand still" in calibrate(world).message, WAIT_S, "a refusal")
+            assert not journal_entries(world)
+        wire.wait_until_reads(FIELD_OF_VIEW, USERS_DEG)
+        asking = threading.Thread(target=calibrate, args=(world,))
+        asking.start()
+        wait_until(lambda: journal_entries(world) == ["field_of_view"], WAIT_S, "its turn")
+    asking.join()
+    assert wire.read(FIELD_OF_VIEW) == USERS_DEG
+
+
 @pytest.mark.parametrize(
     ("region", "own"), [((0, 0, 320, 240), False), ((0, 0, 320, 240), True), ((0, 0, 640, 480), False)]
 )

@@ -146,8 +146,8 @@ class CaptureNode : public BaseNode {
   void refuseWhileRecorded() const;
   /// @return why it did not come to its end; empty: it did
   std::string stepFieldOfView(double own, double other);
-  /// X-Plane's field of view as it shows it [deg]. @throws std::runtime_error where it may not be changed, with a
-  /// sentence for people
+  /// X-Plane's field of view as it shows it [deg], once it stands. @throws std::runtime_error where it may not be
+  /// changed, with a sentence for people
   double fieldOfViewToChange();
   /// @return whether a new entry was made
   bool noteFieldOfView(double shown);
@@ -184,7 +184,9 @@ class CaptureNode : public BaseNode {
 
   mutable std::mutex camera_mutex_;
   bool camera_known_ = false;
-  double field_of_view_deg_ = 0.0;  // horizontal, of the newest frame
+  double field_of_view_deg_ = 0.0;           // horizontal, of the newest frame
+  std::int64_t field_of_view_since_ns_ = 0;  // when a frame first had it
+  std::int64_t field_of_view_heard_ns_ = 0;  // when the newest frame came
   std::string pose_report_;
   double lever_scatter_ = 0.0;  // [m]
   double frustum_shift_up_ = std::numeric_limits<double>::quiet_NaN();
