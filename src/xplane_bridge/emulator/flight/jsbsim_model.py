@@ -10,9 +10,8 @@ from __future__ import annotations
 import json
 import math
 import xml.etree.ElementTree as ElementTree
-from functools import lru_cache
 from pathlib import Path
-from typing import Any, Optional, Sequence, Tuple, TypeVar
+from typing import Any, Optional, Sequence, TypeVar
 
 import jsbsim
 
@@ -42,6 +41,7 @@ from xplane_bridge.emulator.flight.jsbsim_state import (
     missing_gravity,
     new_jsbsim,
     start_motion,
+    substeps,
 )
 from xplane_bridge.emulator.flight.limits import (
     check_atmosphere,
@@ -63,13 +63,6 @@ DEEPEST_PLACE_M = 0.25
 
 _ROOT = Path(__file__).resolve().parents[1]  # holds aircraft/
 _T = TypeVar("_T")
-
-
-@lru_cache(maxsize=16)
-def substeps(dt: float) -> Tuple[int, float]:
-    """Number and length [s] of the JSBSim steps that fly `dt`."""
-    count = max(1, math.ceil(dt / MAX_SUBSTEP_S - 1e-6))
-    return count, dt / count
 
 
 class JsbsimModel:

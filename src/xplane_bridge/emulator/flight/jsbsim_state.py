@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import os
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, Callable, Sequence
+from typing import Any, Callable, Sequence, Tuple
 
 import jsbsim
 
 from xplane_bridge import compiled
-from xplane_bridge.emulator.flight.flight_model import HIGHEST_LATITUDE_DEG, FlightModelError, ModelState
+from xplane_bridge.emulator.flight.flight_model import HIGHEST_LATITUDE_DEG, MAX_SUBSTEP_S, FlightModelError, ModelState
 from xplane_bridge.units import EARTH_RADIUS_M, FOOT_M, GRAVITY_MPS2, KNOT_MPS
 
 POUND_FORCE_N = 4.4482216152605
@@ -92,6 +93,13 @@ LOADS = (
     ("external_reactions/thrusters_m/magnitude-lbsft", POUND_FOOT_NM),
     ("external_reactions/thrusters_n/magnitude-lbsft", POUND_FOOT_NM),
 )
+
+
+@lru_cache(maxsize=16)
+def substeps(dt: float) -> Tuple[int, float]:
+    """Number and length [s] of the JSBSim steps that fly `dt`."""
+    count = max(1, math.ceil(dt / MAX_SUBSTEP_S - 1e-6))
+    return count, dt / count
 
 
 def quaternion_from_euler(roll: float, pitch: float, heading: float) -> tuple[float, float, float, float]:

@@ -20,8 +20,8 @@ from xplane_bridge.emulator.flight.flight_model import (
     Side,
     SurfaceKind,
 )
-from xplane_bridge.emulator.flight.jsbsim_model import JsbsimModel, substeps
-from xplane_bridge.emulator.flight.jsbsim_state import SLUG_FT3_KG_M3
+from xplane_bridge.emulator.flight.jsbsim_model import JsbsimModel
+from xplane_bridge.emulator.flight.jsbsim_state import SLUG_FT3_KG_M3, substeps
 from xplane_bridge.emulator.flight.rotors import Governor, GovernorSpec, PistonEngine, PistonSpec, Rotor, RotorSpec
 from xplane_bridge.units import EARTH_RADIUS_M, FOOT_M
 
