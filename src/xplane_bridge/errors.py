@@ -1,7 +1,14 @@
 """The root of this package's exceptions, and what readers of files share."""
 
 import math
-from typing import Any, Union
+from typing import Any, Iterator, Tuple, Union
+
+_YAML = "tag:yaml.org,2002:"
+#: Values that YAML has and ROS's parameters have not.
+_NO_PARAMETERS = {
+    _YAML + "null": "has no value: give it one, or take it out",
+    _YAML + "timestamp": "is a date: put it in quotes",
+}
 
 
 class XplaneBridgeError(Exception):
@@ -27,3 +34,28 @@ def yaml_problem(error: Exception) -> str:
     if mark is None or problem is None:
         return f"does not parse as YAML: {' '.join(str(error).split())}"
     return f"does not parse as YAML: line {mark.line + 1}, column {mark.column + 1}: {problem}"
+
+
+def yaml_entries(node: Any) -> Iterator[Tuple[Any, Any]]:
+    """Keys and values of a composed YAML mapping, with those that are merged into it; of other nodes none."""
+    for key, value in node.value if getattr(node, "id", "") == "mapping" else []:
+        if key.tag == _YAML + "merge":
+            for merged in value.value if value.id == "sequence" else [value]:
+                yield from yaml_entries(merged)
+        else:
+            yield key, value
+
+
+def unsettable(node: Any, name: str = "") -> Iterator[Tuple[str, str]]:
+    """What ROS cannot set of a composed YAML file of parameters: its full name (`buttons/gear`), and what to do."""
+    for key, value in yaml_entries(node):
+        full = f"{name}/{key.value}" if name else key.value
+        if key.tag == _YAML + "str":
+            yield from unsettable(value, full)
+        else:
+            yield full, "is a key that is no text: put it in quotes"
+    if getattr(node, "id", "") == "sequence":
+        for index, value in enumerate(node.value):
+            yield from unsettable(value, f"{name}[{index}]")
+    elif name and node.tag in _NO_PARAMETERS:
+        yield name, _NO_PARAMETERS[node.tag]

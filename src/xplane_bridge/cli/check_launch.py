@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
@@ -15,7 +16,7 @@ from typing import Callable, Dict, Iterator, List, Mapping, Optional, Sequence, 
 import yaml
 
 from xplane_bridge.cli.entry import guarded, ros_arguments
-from xplane_bridge.errors import XplaneBridgeError, yaml_problem
+from xplane_bridge.errors import XplaneBridgeError, unsettable, yaml_entries, yaml_problem
 from xplane_bridge.resources import config_file
 
 #: The value by which an argument leaves a parameter as its file has it.
@@ -46,6 +47,11 @@ def _number(_: str, value: str, __: Given) -> str:
 
 def _flag(_: str, value: str, __: Given) -> str:
     return "" if value.lower() in _FLAGS else "expected true or false"
+
+
+def _attribute(_: str, value: str, __: Given) -> str:
+    """A flag that becomes a node's attribute: roslaunch takes 1 and 0 for `if`, `unless` and parameters only."""
+    return "" if value.lower() in ("true", "false") else "expected true or false, as a word"
 
 
 def _field_of_view(name: str, value: str, given: Given) -> str:
@@ -86,7 +92,7 @@ def _joy_config(_: str, value: str, given: Given) -> str:
         path = config_file("joysticks", "README.md").with_name(f"{value}.yaml")
     elif not path.is_absolute():
         return _full_path("joy_config", value)
-    return _shipped("joystick", "joysticks", "joy_config")("joy_config", str(path), given)
+    return _shipped("joystick", "joysticks", "joy_config", _readable)("joy_config", str(path), given)
 
 
 def _full_path(name: str, value: str) -> str:
@@ -101,17 +107,14 @@ def _composed(path: Path) -> Optional[yaml.Node]:
 
 def _leaves(node: Optional[yaml.Node], above: str = "") -> Iterator[Tuple[str, yaml.Node]]:
     """The parameters of a mapping, by their full names (`lockstep/enabled`)."""
-    for key, value in node.value if isinstance(node, yaml.MappingNode) else []:
-        if key.tag == "tag:yaml.org,2002:merge":
-            for merged in value.value if isinstance(value, yaml.SequenceNode) else [value]:
-                yield from _leaves(merged, above)
-        elif isinstance(value, yaml.MappingNode):
+    for key, value in yaml_entries(node):
+        if isinstance(value, yaml.MappingNode):
             yield from _leaves(value, f"{above}{key.value}/")
         else:
             yield f"{above}{key.value}", value
 
 
-def _parameters(_: str, value: str, __: Given) -> str:
+def _readable(_: str, value: str, __: Given) -> str:
     """A file of parameters: there, readable, YAML, a mapping."""
     try:
         node = _composed(Path(value))
@@ -124,6 +127,12 @@ def _parameters(_: str, value: str, __: Given) -> str:
     if node is not None and not isinstance(node, yaml.MappingNode):
         return "is YAML, but no list of `key: value`"
     return ""
+
+
+def _parameters(name: str, value: str, given: Given) -> str:
+    """A file of parameters that roslaunch loads; where it cannot, it names neither the file nor the key."""
+    problem = _readable(name, value, given)
+    return problem or "; ".join(" ".join(each) for each in unsettable(_composed(Path(value))))
 
 
 def _common(name: str, value: str, given: Given) -> str:
@@ -144,16 +153,32 @@ def _common(name: str, value: str, given: Given) -> str:
     return f"take out {', '.join(strange)}; it is for {', '.join(shared)}" if strange else ""
 
 
-def _other_frames(said: Mapping[str, yaml.Node], measured: str) -> str:
-    """Frames that camera.launch would overwrite with its own; copies of the shipped file have the first camera's."""
+def _frames(measured: str) -> Dict[str, Tuple[str, str]]:
+    """Of each parameter that names a frame: what camera.launch gives, and the first camera's, as shipped."""
     shipped = dict(_leaves(_composed(config_file("capture.yaml"))))
     stem = measured[: -len("optical")]
     named = {"frame_measured": measured}
     named.update({f"frame_{view}": f"{stem}{view}_optical" for view in ("forward", "rear", "down")})
+    return {key: (name, shipped[key].value) for key, name in named.items()}
+
+
+def _camera(_: str, value: str, __: Given) -> str:
+    """The name of a further camera: a namespace, and the start of its frames' names."""
+    if not re.fullmatch(r"\w+(/\w+)*", value, re.ASCII):
+        return "expected letters, digits and underscores, as in camera:=belly: topics are named after it"
+    frames = _frames(f"{value}_optical").values()
+    shared = {name for name, _ in frames} & {first for _, first in frames}
+    if not shared:
+        return ""
+    return f"the first camera has {', '.join(sorted(shared))}; give a name that is not taken, e.g. camera:=camera2"
+
+
+def _other_frames(said: Mapping[str, yaml.Node], measured: str) -> str:
+    """Frames that camera.launch would overwrite with its own; copies of the shipped file have the first camera's."""
     others = [
         f"{key} (here {name})"
-        for key, name in named.items()
-        if key in said and said[key].value not in (name, shipped[key].value)
+        for key, (name, first) in _frames(measured).items()
+        if key in said and said[key].value not in (name, first)
     ]
     return f"take out {', '.join(others)}: a further camera's frames are named after it" if others else ""
 
@@ -183,20 +208,21 @@ def _engage(name: str, value: str, given: Given) -> str:
     return "needs set_points:=true (default: with aircraft:=multirotor, which alone flies set-points)"
 
 
-def _shipped(kind: str, folder: str, stem: str) -> Check:
+def _shipped(kind: str, folder: str, stem: str, look: Check = _parameters) -> Check:
     """A file of parameters that is named by its stem, unless by its path.
 
     Args:
         kind: Of thing, for the message.
         folder: Below config/.
         stem: The argument that names the stem.
+        look: What the file has to be.
     """
 
     def check(name: str, value: str, given: Given) -> str:
         path = Path(value)
         home = config_file(folder, "README.md").parent
         if path.is_file() or path.parent.resolve() != home.resolve():
-            return _parameters(name, value, given)
+            return look(name, value, given)
         there = ", ".join(sorted(file.stem for file in home.glob("*.yaml")))
         return (
             f"there is no {kind} of that name ({stem}:={path.stem}); there is {there}; "
@@ -230,9 +256,11 @@ CHECKS: Dict[str, Check] = {
     "window_index": _whole,
     **dict.fromkeys(("display_delay", "max_publish_rate", "image_rate", "heading", "pitch", "roll"), _number),
     "field_of_view": _field_of_view,
+    "camera": _camera,
     "frame": lambda *_: "",  # derived: what capture_config is held against
-    **dict.fromkeys(("rx", "tx", "capture", "listen_for_beacon", "publish_tf", "configure_xplane", "required"), _flag),
+    **dict.fromkeys(("rx", "tx", "capture", "listen_for_beacon", "publish_tf", "configure_xplane"), _flag),
     **dict.fromkeys(("set_points", "lockstep"), _flag),
+    "required": _attribute,
     "ns": _namespace,
     "engage": _engage,
     "compression": _one_of("none", "lz4", "bz2"),

@@ -8,7 +8,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import yaml
 
-from xplane_bridge.errors import XplaneBridgeError, is_number, yaml_problem
+from xplane_bridge.errors import XplaneBridgeError, is_number, unsettable, yaml_problem
 
 _BAR = 8  #: characters of an axis' bar on either side of its middle
 _MODES = {"manual": "asks for MANUAL", "auto": "asks for AUTO", "toggle": "asks for the other mode"}
@@ -53,10 +53,11 @@ def load_joy_config(file: Path, stick_mode: Optional[int] = None) -> JoyConfig:
         stick_mode: 1 or 2; None: as the file says.
 
     Raises:
-        JoyConfigError: It is not there or not YAML.
+        JoyConfigError: It is not there, not YAML, or has what ROS cannot set.
     """
     try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
+        text = file.read_text(encoding="utf-8")
+        content, node = yaml.safe_load(text), yaml.compose(text)
     except OSError as error:
         raise JoyConfigError(f"{file}: {error.strerror}; expected a file like those in config/joysticks") from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:
@@ -65,6 +66,11 @@ def load_joy_config(file: Path, stick_mode: Optional[int] = None) -> JoyConfig:
         raise JoyConfigError(
             f"{file}: expected keys like device, direct, integrated, buttons, mode; see config/joysticks"
         )
+    empty = {name for name, section in content.items() if section is None}  # all lines of it are comments
+    problems = [f"{name.replace('/', '.')} {what}" for name, what in unsettable(node) if name not in empty]
+    if problems:
+        raise JoyConfigError(f"{file}: {'; '.join(problems)}")
+    content = {name: section for name, section in content.items() if name not in empty}
     mode = stick_mode or (1 if content.get("stick_mode") == 1 else 2)
     config = JoyConfig(file, content, mode)
     for name, entry in _entries(content, "direct"):

@@ -103,7 +103,9 @@ LAUNCHES = [
     ("demo.launch xplane_version:=twelve", 1, ["xplane_version:=twelve: expected a whole number"]),
     ("rx.launch max_publish_rate:=fast", 1, ["max_publish_rate:=fast: expected a number"]),
     ("bridge.launch rx:=perhaps", 1, ["rx:=perhaps: expected true or false"]),
+    ("rx.launch required:=1", 1, ["required:=1: expected true or false, as a word"]),
     ("rx.launch rx_config:={}/broken.yaml", 1, [UNPARSED]),
+    ("joystick.launch joy_config_file:={}/empty_section.yaml", 1, ["empty_section.yaml: buttons has no value"]),
     ("rx.launch common_config:={}/list.yaml", 1, ["list.yaml: is YAML, but no list of `key: value`"]),
     ("rx.launch common_config:={}/strange.yaml", 1, ["take out publish_tf (belongs into rx_config), hots (unknown)"]),
     ("capture.launch capture_config:={}/nothing_in_it", 1, ["nothing_in_it: Is a directory"]),
@@ -130,6 +132,8 @@ LAUNCHES = [
         1,
         ["(joy_config:=wheel)", JOYSTICKS],
     ),
+    ("camera.launch camera:=camera", 1, ["camera:=camera: the first camera has camera_down_optical, "]),
+    ("camera.launch camera:=wing-left", 1, ["camera:=wing-left: expected letters, digits and underscores"]),
     ("camera.launch window_index:=left", 1, ["window_index:=left: expected a whole number"]),
     ("camera.launch capture_config:={}/strange.yaml", 1, ["give window_index:=1, or window: {index: 1} in the file"]),
     ("camera.launch heading:=north", 1, ["heading:=north: expected a number"]),
@@ -160,6 +164,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (path / "soon.yaml").write_text("name: x\nevents:\n  - {at: soon, end: true}\n")
     (path / "list.yaml").write_text("- a\n- b\n")
     (path / "strange.yaml").write_text("host: 127.0.0.1\npublish_tf: true\nhots: 127.0.0.1\n")
+    (path / "empty_section.yaml").write_text("device: Pad\nbuttons:\n  # gear: {button: 3}\n")
     (path / "nothing_in_it").mkdir()
     return path
 

@@ -37,6 +37,46 @@ def test_the_shipped_files_are_good() -> None:
     assert problems({f"{name}_config": str(config_file(f"{name}.yaml")) for name in ("common", "rx", "tx")}) == []
 
 
+EMPTY, NO_TEXT = "has no value: give it one, or take it out", "is a key that is no text: put it in quotes"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("device: Pad\nbuttons:\n  # gear: {button: 3}\n", f"buttons {EMPTY}"),
+        ("buttons:\n  1: {button: 3}\n  on: ~\n", f"buttons/1 {NO_TEXT}; buttons/on {NO_TEXT}"),
+        ("direct: {roll: {axis: , scale: 1.0}}\n", f"direct/roll/axis {EMPTY}"),
+        ("device: 2026-11-30\n", "device is a date: put it in quotes"),
+        ("points: [1, ~]\nviews: [{2: a}]\n", f"points[1] {EMPTY}; views[0]/2 {NO_TEXT}"),
+        ("one: &one {a: 1}\ntwo: {<<: [*one, {b: }]}\n", f"two/b {EMPTY}"),
+        ('buttons: {"1": {button: 3}, "on": {}}\nangle: !degrees 30\nname: ""\n', ""),
+    ],
+)
+def test_what_roslaunch_cannot_set_is_refused_by_its_key(tmp_path: Path, text: str, said: str) -> None:
+    file = tmp_path / "pad.yaml"
+    file.write_text(text, encoding="utf-8")
+    for name in ("joy_config_file", "aircraft_file", "rx_config"):
+        assert problems({name: str(file)}) == ([f"{name}:={file}: {said}"] if said else [])
+    assert problems({"joy_config": str(file)}) == [], "scenario_player reads it, without roslaunch"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "good"),
+    [
+        ("required", "True", True),  # as $(eval) writes it
+        ("required", "FALSE", True),
+        ("required", "1", False),
+        ("required", "0", False),
+        ("rx", "1", True),
+        ("rx", "True", True),
+        ("rx", "yes", False),
+    ],
+)
+def test_flags_are_what_roslaunch_takes_for_them(name: str, value: str, good: bool) -> None:
+    lines = problems({name: value})
+    assert [line.startswith(f"{name}:={value}: expected true or false") for line in lines] == ([] if good else [True])
+
+
 @pytest.mark.parametrize(
     ("name", "value", "good"),
     [
@@ -124,3 +164,28 @@ def test_a_further_cameras_frames_are_named_after_it(tmp_path: Path, text: str, 
     wanted = "take out frame_measured (here belly_optical), frame_down (here belly_down_optical): a further camera's"
     lines = problems(given)
     assert [wanted in line for line in lines] == ([] if good else [True])
+
+
+@pytest.mark.parametrize(
+    ("camera", "said"),
+    [
+        ("camera2", ""),
+        ("belly", ""),
+        ("wing/left_2", ""),
+        ("2", ""),
+        (
+            "camera",
+            "camera:=camera: the first camera has camera_down_optical, camera_forward_optical, camera_optical, ",
+        ),
+        ("camera_rear", "camera:=camera_rear: the first camera has camera_rear_optical; give a name that is not taken"),
+        ("left wing", "camera:=left wing: expected letters, digits and underscores"),
+        ("wing-left", "camera:=wing-left: expected letters, digits and underscores"),
+        ("/belly", "camera:=/belly: expected letters"),
+        ("wing//left", "camera:=wing//left: expected letters"),
+        ("h\u00f6he", "camera:=h\u00f6he: expected letters"),
+    ],
+)
+def test_a_further_camera_has_a_name_of_its_own(camera: str, said: str) -> None:
+    lines = problems({"camera": camera})
+    assert len(lines) == (1 if said else 0)
+    assert all(line.startswith(said) for line in lines)

@@ -139,6 +139,10 @@ def test_every_key_of_the_shipped_files_is_shown(name):
         (None, "No such file"),
         ("roll: {axis: 0", "pad.yaml: does not parse as YAML: line 1, column 15: "),
         ("- 1\n", "expected keys like device"),
+        ("buttons: {1: {button: 3}}\n", "pad.yaml: buttons.1 is a key that is no text: put it in quotes"),
+        ("device: 2026-11-30\n", "pad.yaml: device is a date: put it in quotes"),
+        ("1:\n", "pad.yaml: 1 is a key that is no text"),
+        ("direct: {roll: }\nmode: {auto: ~}\n", "direct.roll has no value: .* out; mode.auto has no value"),
     ],
 )
 def test_a_file_that_is_none_is_said(tmp_path, content, part):
@@ -147,6 +151,14 @@ def test_a_file_that_is_none_is_said(tmp_path, content, part):
         file.write_text(content, encoding="utf-8")
     with pytest.raises(JoyConfigError, match=part):
         load_joy_config(file)
+
+
+def test_a_section_whose_lines_are_all_comments_is_none(tmp_path):
+    file = tmp_path / "pad.yaml"
+    file.write_text("device:\ndirect: {roll: {axis: 0}}\nbuttons:\n  # gear: {button: 3}\n", encoding="utf-8")
+    config = load_joy_config(file)
+    assert config.content == {"direct": {"roll": {"axis": 0}}}, "joystick_mapper_node gets it"
+    assert config.device == "pad"
 
 
 @pytest.mark.parametrize(("axes", "buttons", "keys"), [(2, 0, 2), (3, 1, 3), (8, 12, 4)])
