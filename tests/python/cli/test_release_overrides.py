@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import fcntl
 import json
+import os
 import re
 import socket
 import struct
+import subprocess
+import sys
 import threading
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Tuple
@@ -55,6 +58,16 @@ def left(tmp_path: Path) -> Tuple[XPlane, Path]:
     """An X-Plane with two overrides, and the journal that has them."""
     xplane = XPlane()
     return xplane, write(tmp_path / f"127.0.0.1_{xplane.port}.json", override(STICK), override(THROTTLES))
+
+
+def test_an_empty_folder_is_the_usual_one(tmp_path: Path) -> None:
+    (tmp_path / "xplane_bridge").mkdir()
+    write(tmp_path / "xplane_bridge" / "127.0.0.1_49000.json", override(STICK))
+    command = [sys.executable, str(TOOL), "--list", "--folder", ""]
+    done = subprocess.run(
+        command, env={**os.environ, "ROS_HOME": str(tmp_path)}, stdout=subprocess.PIPE, text=True, check=True
+    )
+    assert STICK in done.stdout
 
 
 def test_all_is_released_and_taken_out(left: Tuple[XPlane, Path]) -> None:
