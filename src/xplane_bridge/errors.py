@@ -1,7 +1,8 @@
 """The root of this package's exceptions, and what readers of files share."""
 
+import itertools
 import math
-from typing import Any, Iterator, Tuple, Union
+from typing import Any, Iterator, Set, Tuple, Union
 
 _YAML = "tag:yaml.org,2002:"
 #: Values that YAML has and ROS's parameters have not.
@@ -46,16 +47,36 @@ def yaml_entries(node: Any) -> Iterator[Tuple[Any, Any]]:
             yield key, value
 
 
-def unsettable(node: Any, name: str = "") -> Iterator[Tuple[str, str]]:
-    """What ROS cannot set of a composed YAML file of parameters: its full name (`buttons/gear`), and what to do."""
+def unsettable(node: Any) -> Iterator[Tuple[str, str]]:
+    """What ROS cannot set of a composed YAML file of parameters: its full name (`buttons/gear`), and what to do.
+
+    Also where an argument of the launch file would give the value.
+    """
+    if _is_endless(node, (), set()):
+        yield "an alias", "stands for what it is part of: write it out"
+    else:
+        yield from _unsettable(node, "")
+
+
+def _is_endless(node: Any, above: Tuple[Any, ...], done: Set[int]) -> bool:
+    if any(node is each for each in above):
+        return True
+    if id(node) in done or not isinstance(getattr(node, "value", None), list):
+        return False
+    done.add(id(node))
+    parts = itertools.chain.from_iterable(part if isinstance(part, tuple) else (part,) for part in node.value)
+    return any(_is_endless(part, (*above, node), done) for part in parts)
+
+
+def _unsettable(node: Any, name: str) -> Iterator[Tuple[str, str]]:
     for key, value in yaml_entries(node):
         full = f"{name}/{key.value}" if name else key.value
         if key.tag == _YAML + "str":
-            yield from unsettable(value, full)
+            yield from _unsettable(value, full)
         else:
             yield full, "is a key that is no text: put it in quotes"
     if getattr(node, "id", "") == "sequence":
         for index, value in enumerate(node.value):
-            yield from unsettable(value, f"{name}[{index}]")
+            yield from _unsettable(value, f"{name}[{index}]")
     elif name and node.tag in _NO_PARAMETERS:
         yield name, _NO_PARAMETERS[node.tag]

@@ -37,6 +37,7 @@ def test_the_shipped_files_are_good() -> None:
     assert problems({f"{name}_config": str(config_file(f"{name}.yaml")) for name in ("common", "rx", "tx")}) == []
 
 
+ENDLESS = "stands for what it is part of: write it out"
 EMPTY, NO_TEXT = "has no value: give it one, or take it out", "is a key that is no text: put it in quotes"
 
 
@@ -49,6 +50,9 @@ EMPTY, NO_TEXT = "has no value: give it one, or take it out", "is a key that is 
         ("device: 2026-11-30\n", "device is a date: put it in quotes"),
         ("points: [1, ~]\nviews: [{2: a}]\n", f"points[1] {EMPTY}; views[0]/2 {NO_TEXT}"),
         ("one: &one {a: 1}\ntwo: {<<: [*one, {b: }]}\n", f"two/b {EMPTY}"),
+        ("points: &points [1, *points]\n", f"an alias {ENDLESS}"),
+        ("one: &one {a: 1, deeper: {of: *one}}\n", f"an alias {ENDLESS}"),
+        ("one: &one [1]\ntwo: [*one, *one]\n", ""),
         ('buttons: {"1": {button: 3}, "on": {}}\nangle: !degrees 30\nname: ""\n', ""),
     ],
 )

@@ -141,6 +141,7 @@ def test_every_key_of_the_shipped_files_is_shown(name):
         ("- 1\n", "expected keys like device"),
         ("buttons: {1: {button: 3}}\n", "pad.yaml: buttons.1 is a key that is no text: put it in quotes"),
         ("device: 2026-11-30\n", "pad.yaml: device is a date: put it in quotes"),
+        ("direct: &all {roll: *all}\n", "pad.yaml: an alias stands for what it is part of"),
         ("1:\n", "pad.yaml: 1 is a key that is no text"),
         ("direct: {roll: }\nmode: {auto: ~}\n", "direct.roll has no value: .* out; mode.auto has no value"),
     ],
