@@ -19,6 +19,7 @@ inline Py_ssize_t slotOffset(PyTypeObject* type, PyObject* name) {
   if (PyObject_HasAttr(owner, name) == 0) return 0;
   const Object found = attribute(owner, name);
   if (Py_TYPE(found.get()) != &PyMemberDescr_Type) return 0;
+  if (PyType_IsSubtype(type, PyDescr_TYPE(found.get())) == 0) return 0;  // another type's
   const PyMemberDef& member = *reinterpret_cast<PyMemberDescrObject*>(found.get())->d_member;
   return member.type == T_OBJECT_EX && (member.flags & READONLY) == 0 ? member.offset : 0;
 }
@@ -68,8 +69,10 @@ class Name {
   PyObject** slotIn(PyObject* owner) const {
     PyTypeObject* const type = Py_TYPE(owner);
     if (reinterpret_cast<PyObject*>(type) != type_.get()) {
-      type_ = Object::borrowed(reinterpret_cast<PyObject*>(type));
-      offset_ = slotOffset(type, text_.get());
+      const Py_ssize_t offset = slotOffset(type, text_.get());  // may throw, or run code that looks here
+      Object before = Object::borrowed(reinterpret_cast<PyObject*>(type));
+      std::swap(type_, before);  // which ends last
+      offset_ = offset;
     }
     return slotAt(owner, offset_);
   }

@@ -15,7 +15,13 @@ from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.datarefs.aircraft_systems import Weather
 from xplane_bridge.emulator.flight.earth import LocalFrame
 from xplane_bridge.emulator.flight.failure_effects import FailureEffects
-from xplane_bridge.emulator.flight.flight_model import Controls, InitialState, SurfaceFault, SurfaceFaultKind
+from xplane_bridge.emulator.flight.flight_model import (
+    Controls,
+    InitialState,
+    ModelState,
+    SurfaceFault,
+    SurfaceFaultKind,
+)
 from xplane_bridge.emulator.simulator import Simulator
 from xplane_bridge.in_process.aircraft import AUTO, MANUAL, Aircraft, Conditions, arbiter_options
 from xplane_bridge.in_process.failures import Failures, NotFlownError
@@ -285,6 +291,35 @@ def test_the_truth_of_a_frame_is_every_number_in_doubles() -> None:
     )  # fmt: skip
     assert len(set(numbers)) > 20
     assert core.truth_bytes(s) == struct.pack(f"={len(numbers)}d", *numbers)
+
+
+def test_a_slot_of_another_type_is_no_number_of_this_one() -> None:
+    class View:
+        __slots__ = ()
+        sim_time_s = vars(ModelState)["sim_time_s"]  # Python itself refuses it
+
+    with pytest.raises(TypeError, match="sim_time_s"):
+        core.truth_bytes(View())
+
+
+def test_a_type_whose_attributes_cannot_be_looked_up_leaves_nothing_behind() -> None:
+    class Lookups(type):
+        asked = 0
+
+        def __getattr__(cls, name: str) -> object:
+            Lookups.asked += 1
+            if Lookups.asked > 1:
+                raise RuntimeError("no more")
+            return None
+
+    class View(metaclass=Lookups):
+        __slots__ = ()
+
+    core.truth_bytes(create_model("fixed_wing").state)  # the places in a state are known
+    for _ in range(2):
+        Lookups.asked = 0
+        with pytest.raises((RuntimeError, AttributeError)):
+            core.truth_bytes(View())
 
 
 def test_a_number_beyond_float32_is_no_view() -> None:
