@@ -253,8 +253,7 @@ class Player:
         if throttle is not None and math.isfinite(throttle):
             self._throttle = throttle
         for axis, value in stick.items():
-            if self._apply_excitations:
-                value += self._excitation(axis, now)
+            value += self._excitation(axis, now) if self._apply_excitations else 0.0  # which also makes 0 of -0
             low, high = STICK_AXES[axis]
             stick[axis] = min(max(value, low), high)
         return stick
