@@ -2,11 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
 #include <utility>
-
-#include "xplane_bridge/core/base/text.hpp"
 
 namespace xplane_bridge::core {
 namespace {
@@ -38,96 +35,7 @@ double commanded(JoyTarget target, const ControlCommand& in) {
   return target == JoyTarget::kBrakes ? in.left_brake : in.*rowOf(target).value;
 }
 
-std::string rangeText(ChannelRange range) {
-  char text[48];
-  std::snprintf(text, sizeof text, "%g..%g", range.low, range.high);
-  return text;
-}
-
-bool inRange(double value, ChannelRange range) { return value >= range.low && value <= range.high; }
-
-/// A button that another one of them is would do both at once.
-std::optional<std::string> checkButtons(const std::vector<std::pair<std::string, int>>& buttons) {
-  for (std::size_t i = 0; i < buttons.size(); ++i) {
-    for (std::size_t k = 0; k < i; ++k) {
-      if (buttons[i].second < 0 || buttons[i].second != buttons[k].second) continue;
-      return wrongNumber(buttons[i].first, buttons[i].second, "another button than that of " + buttons[k].first);
-    }
-  }
-  return std::nullopt;
-}
-
-template <class Input>
-std::optional<std::string> checkSteps(const Input& in) {
-  return checkButtons(
-      {{in.key + ".increase_button", in.increase_button}, {in.key + ".decrease_button", in.decrease_button}});
-}
-
-std::optional<std::string> checkIntegrated(const IntegratedInput& in, StickMode mode) {
-  const bool has_axis = in.axis.of(mode) >= 0;
-  const bool has_buttons = in.increase_button >= 0 || in.decrease_button >= 0;
-  if (has_axis == has_buttons) return in.key + ": expected either an axis or increase_button and decrease_button";
-  if (auto text = checkSteps(in)) return text;
-  if (!std::isfinite(in.rate) || in.rate == 0.0)
-    return wrongNumber(in.key + ".rate", in.rate, "a rate other than 0 [1/s]");
-  if (!(in.dead_zone >= 0.0 && in.dead_zone < 1.0))
-    return wrongNumber(in.key + ".dead_zone", in.dead_zone, "0 to below 1");
-  const ChannelRange range = commandRange(in.target);
-  if (!inRange(in.low, range)) return wrongNumber(in.key + ".low", in.low, rangeText(range));
-  if (!inRange(in.high, range) || in.high <= in.low) {
-    return wrongNumber(in.key + ".high", in.high, rangeText(range) + ", above low");
-  }
-  if (!inRange(in.initial, {in.low, in.high})) {
-    return wrongNumber(in.key + ".initial", in.initial, rangeText({in.low, in.high}));
-  }
-  for (std::size_t i = 0; i < in.detents.size(); ++i) {
-    if (!inRange(in.detents[i], {in.low, in.high}) || (i > 0 && in.detents[i] <= in.detents[i - 1])) {
-      return wrongNumber(in.key + ".detents", in.detents[i], "rising values within " + rangeText({in.low, in.high}));
-    }
-  }
-  return std::nullopt;
-}
-
-std::optional<std::string> checkSurface(const SurfaceInput& in, StickMode mode) {
-  constexpr ChannelRange kTravel{-90.0, 90.0};  // [deg]
-  const bool has_axis = in.axis.of(mode) >= 0;
-  const bool has_buttons = in.increase_button >= 0 || in.decrease_button >= 0;
-  if (has_axis == has_buttons) return in.key + ": expected either an axis or increase_button and decrease_button";
-  if (auto text = checkSteps(in)) return text;
-  if (!std::isfinite(in.rate)) return wrongNumber(in.key + ".rate", in.rate, "a finite number [1/s]");
-  if (has_buttons && in.rate == 0.0)
-    return wrongNumber(in.key + ".rate", in.rate, "a rate other than 0 [1/s], for buttons");
-  if (!std::isfinite(in.scale) || in.scale == 0.0)
-    return wrongNumber(in.key + ".scale", in.scale, "a number other than 0");
-  if (in.select_button < 0)
-    return wrongNumber(in.key + ".select_button", in.select_button, "the button that chooses it");
-  if (!(in.dead_zone >= 0.0 && in.dead_zone < 1.0))
-    return wrongNumber(in.key + ".dead_zone", in.dead_zone, "0 to below 1");
-  if (!inRange(in.low, kTravel)) return wrongNumber(in.key + ".low", in.low, rangeText(kTravel) + " [deg]");
-  if (!inRange(in.high, kTravel) || in.high <= in.low) {
-    return wrongNumber(in.key + ".high", in.high, rangeText(kTravel) + " [deg], above low");
-  }
-  if (inRange(in.initial, {in.low, in.high})) return std::nullopt;
-  return wrongNumber(in.key + ".initial", in.initial, rangeText({in.low, in.high}) + " [deg]");
-}
-
-/// The last of two inputs of a kind with one target would decide alone.
-template <class Input>
-std::optional<std::string> checkTargets(const std::vector<Input>& inputs) {
-  for (std::size_t i = 0; i < inputs.size(); ++i) {
-    for (std::size_t k = 0; k < i; ++k) {
-      if (inputs[i].target != inputs[k].target) continue;
-      return inputs[i].key + ".target is " + toString(inputs[i].target) + ": expected another than that of " +
-             inputs[k].key;
-    }
-  }
-  return std::nullopt;
-}
-
-bool sameSource(const IntegratedInput& a, const IntegratedInput& b, StickMode mode) {
-  return a.axis.of(mode) == b.axis.of(mode) && a.increase_button == b.increase_button &&
-         a.decrease_button == b.decrease_button;
-}
+TravelIntegrator integratorOf(const IntegratedInput& in) { return {in.low, in.high, in.initial, in.detents}; }
 
 }  // namespace
 
@@ -141,53 +49,6 @@ std::optional<JoyTarget> joyTargetFrom(const std::string& name) {
 const char* toString(JoyTarget target) { return rowOf(target).name; }
 
 ChannelRange commandRange(JoyTarget target) { return commandRange(rowOf(target).range); }
-
-std::optional<std::string> validate(const JoystickOptions& o) {
-  if (!(o.joy_timeout > 0.0)) return wrongNumber("joy_timeout", o.joy_timeout, "above 0 s");
-  if (!(o.debounce >= 0.0)) return wrongNumber("debounce", o.debounce, "0 s or more");
-  for (const DirectInput& in : o.direct) {
-    if (in.axis.of(o.stick_mode) < 0) return wrongNumber(in.key + ".axis", in.axis.of(o.stick_mode), "an index from 0");
-    if (!std::isfinite(in.scale) || in.scale == 0.0)
-      return wrongNumber(in.key + ".scale", in.scale, "a number other than 0");
-    if (!(in.dead_zone >= 0.0 && in.dead_zone < 1.0))
-      return wrongNumber(in.key + ".dead_zone", in.dead_zone, "0 to below 1");
-    if (!(in.expo >= 0.0 && in.expo <= 1.0)) return wrongNumber(in.key + ".expo", in.expo, "0..1");
-  }
-  if (auto text = checkTargets(o.direct)) return text;
-  if (auto text = checkTargets(o.integrated)) return text;
-  for (std::size_t i = 0; i < o.integrated.size(); ++i) {
-    if (auto text = checkIntegrated(o.integrated[i], o.stick_mode)) return text;
-    for (std::size_t k = 0; k < o.integrated.size(); ++k) {
-      if (k == i || !sameSource(o.integrated[i], o.integrated[k], o.stick_mode)) continue;
-      if (o.integrated[i].select_button < 0) {
-        return wrongNumber(o.integrated[i].key + ".select_button", o.integrated[i].select_button,
-                           "a button, because " + o.integrated[k].key + " has the same axis or buttons");
-      }
-      if (auto text = checkButtons({{o.integrated[k].key + ".select_button", o.integrated[k].select_button},
-                                    {o.integrated[i].key + ".select_button", o.integrated[i].select_button}})) {
-        return text;
-      }
-    }
-  }
-  for (const ButtonInput& in : o.buttons) {
-    if (in.button < 0) return wrongNumber(in.key + ".button", in.button, "an index from 0");
-    const ChannelRange range = commandRange(in.target);
-    if (!inRange(in.value, range)) return wrongNumber(in.key + ".value", in.value, rangeText(range));
-    if (in.released && !inRange(*in.released, range))
-      return wrongNumber(in.key + ".released", *in.released, rangeText(range));
-  }
-  std::vector<std::pair<std::string, int>> chosen_by;
-  for (const SurfaceInput& in : o.surfaces) {
-    if (auto text = checkSurface(in, o.stick_mode)) return text;
-    chosen_by.emplace_back(in.key + ".select_button", in.select_button);
-  }
-  if (auto text = checkButtons(chosen_by)) return text;
-  for (const ActionButton& in : o.actions) {
-    if (in.button < 0) return wrongNumber(in.key + ".button", in.button, "an index from 0");
-  }
-  return checkButtons(
-      {{"mode.manual", o.mode.manual}, {"mode.auto", o.mode.automatic}, {"mode.toggle", o.mode.toggle}});
-}
 
 double shapeAxis(double j, double dead_zone, double expo) {
   const double saturated = std::clamp(j, -1.0, 1.0);
@@ -209,8 +70,7 @@ double TravelIntegrator::valueAt(double fraction) const {
                            [value](double a, double b) { return std::abs(a - value) < std::abs(b - value); });
 }
 
-JoystickMapper::JoystickMapper(const JoystickOptions& options)
-    : options_(options), direct_moved_(options.direct.size(), 0), button_used_(options.buttons.size(), 0) {
+JoystickMapper::JoystickMapper(const JoystickOptions& options) : options_(options) {
   if (const auto text = validate(options)) throw std::invalid_argument(*text);
   for (std::size_t i = 0; i < options_.integrated.size(); ++i) {
     const IntegratedInput& in = options_.integrated[i];
@@ -219,10 +79,7 @@ JoystickMapper::JoystickMapper(const JoystickOptions& options)
       if (sameSource(in, options_.integrated[k], options_.stick_mode)) group = integrated_[k].group;
     }
     if (group == selected_of_group_.size()) selected_of_group_.push_back(i);
-    integrated_.push_back({TravelIntegrator(in.low, in.high, in.initial, in.detents), group});
-  }
-  for (const SurfaceInput& in : options_.surfaces) {
-    surfaces_.push_back({TravelIntegrator(in.low, in.high, in.initial), in.initial});
+    integrated_.push_back({integratorOf(in), group});
   }
 }
 
@@ -283,6 +140,11 @@ std::optional<double> JoystickMapper::axis(int index) const {
   return axes_[static_cast<std::size_t>(index)];
 }
 
+bool JoystickMapper::lacksAxis(AxisIndex wanted) const {
+  const int index = wanted.of(options_.stick_mode);
+  return index >= 0 && !axis(index);
+}
+
 bool JoystickMapper::held(int button) const {
   return button >= 0 && static_cast<std::size_t>(button) < buttons_.size() &&
          buttons_[static_cast<std::size_t>(button)].raw;
@@ -301,9 +163,7 @@ double JoystickMapper::source(const Input& input) const {
 }
 
 void JoystickMapper::integrateUpTo(double now) {
-  // Beyond the last message's life the hat counts as released.
-  const double end = std::min(now, last_joy_ + options_.joy_timeout);
-  const double dt = end - std::max(integrated_until_, last_joy_);
+  const double dt = now - integrated_until_;
   if (dt > 0.0) {
     for (const std::size_t i : selected_of_group_) {
       const double j = source(options_.integrated[i]);
@@ -318,6 +178,7 @@ void JoystickMapper::integrateUpTo(double now) {
 void JoystickMapper::moveSurface(double dt) {
   if (!chosen_surface_) return;
   const SurfaceInput& in = options_.surfaces[*chosen_surface_];
+  if (lacksAxis(in.axis)) return;
   Surface& surface = surfaces_[*chosen_surface_];
   if (in.rate != 0.0) {
     surface.state.integrate(in.rate, source(in), dt);
@@ -335,15 +196,11 @@ void JoystickMapper::moveSurface(double dt) {
 void JoystickMapper::chooseSurface(int button) {
   for (std::size_t i = 0; i < surfaces_.size(); ++i) {
     if (options_.surfaces[i].select_button != button) continue;
+    if (chosen_surface_ != i && lacksAxis(options_.surfaces[i].axis)) return;
     surfaces_[i].commanded = chosen_surface_ != i;
     chosen_surface_ = surfaces_[i].commanded ? std::optional(i) : std::nullopt;
     return;
   }
-}
-
-void JoystickMapper::releaseSurfaces() {
-  for (Surface& surface : surfaces_) surface.commanded = false;
-  chosen_surface_.reset();
 }
 
 /// A press on what is commanded already: the cockpit may have moved it since.
@@ -401,24 +258,43 @@ void JoystickMapper::onPress(int button, double now) {
   }
 }
 
+/// Of a device that appears, or comes back: its levers read 0 until they are touched, and the cockpit may have moved
+/// what they, its hats and buttons commanded before.
+void JoystickMapper::startAnew(double now) {
+  integrated_until_ = now;
+  direct_moved_.assign(options_.direct.size(), 0);
+  button_used_.assign(options_.buttons.size(), 0);
+  for (std::size_t i = 0; i < integrated_.size(); ++i) {
+    integrated_[i].state = integratorOf(options_.integrated[i]);
+    integrated_[i].moved = false;
+  }
+  surfaces_.clear();
+  for (const SurfaceInput& in : options_.surfaces) {
+    surfaces_.push_back({TravelIntegrator(in.low, in.high, in.initial), in.initial});
+  }
+  chosen_surface_.reset();
+  last_ = {};
+  nudged_until_.clear();
+}
+
 bool JoystickMapper::onJoy(const std::vector<float>& axes, const std::vector<std::int32_t>& buttons, double now) {
   if (!check(axes, buttons.size())) {
     ++dropped_;
     return false;
   }
   const bool first = !alive(now);
-  integrateUpTo(now);
+  if (first) {
+    startAnew(now);
+  } else {
+    integrateUpTo(now);
+  }
   last_joy_ = now;
   axes_.assign(axes.begin(), axes.end());
   buttons_.resize(buttons.size());
   for (std::size_t i = 0; i < buttons.size(); ++i) buttons_[i].raw = buttons[i] != 0;
-  // What is held down when the device appears was not pressed for us, and its levers read 0 until they are touched.
+  // What is held down when the device appears was not pressed for us.
   settleButtons(now, !first);
   settleHats(now, !first);
-  if (first) {
-    std::fill(direct_moved_.begin(), direct_moved_.end(), '\0');
-    releaseSurfaces();
-  }
   for (std::size_t i = 0; i < options_.direct.size(); ++i) {
     const auto value = axis(options_.direct[i].axis.of(options_.stick_mode));
     if (value && *value != 0.0) direct_moved_[i] = 1;
@@ -427,10 +303,10 @@ bool JoystickMapper::onJoy(const std::vector<float>& axes, const std::vector<std
 }
 
 JoystickCommand JoystickMapper::update(double now) {
-  integrateUpTo(now);
   JoystickCommand out;
   out.alive = alive(now);
   if (!out.alive) return out;
+  integrateUpTo(now);
   settleButtons(now, true);
   for (std::size_t i = 0; i < options_.direct.size(); ++i) {
     const DirectInput& in = options_.direct[i];
@@ -450,7 +326,8 @@ JoystickCommand JoystickMapper::update(double now) {
     }
   }
   for (std::size_t i = 0; i < integrated_.size(); ++i) {
-    if (integrated_[i].moved) command(options_.integrated[i].target, integrated_[i].state.value(), out.command);
+    const IntegratedInput& in = options_.integrated[i];
+    if (integrated_[i].moved && !lacksAxis(in.axis)) command(in.target, integrated_[i].state.value(), out.command);
   }
   for (std::size_t i = 0; i < options_.buttons.size(); ++i) {
     const ButtonInput& in = options_.buttons[i];
@@ -465,7 +342,8 @@ JoystickCommand JoystickMapper::update(double now) {
     command(target, value > 0.5 * (range.low + range.high) ? value - kNudge : value + kNudge, out.command);
   }
   for (std::size_t i = 0; i < surfaces_.size(); ++i) {
-    if (surfaces_[i].commanded) out.surfaces.push_back({options_.surfaces[i].name, surfaces_[i].deflection_deg});
+    const SurfaceInput& in = options_.surfaces[i];
+    if (surfaces_[i].commanded && !lacksAxis(in.axis)) out.surfaces.push_back({in.name, surfaces_[i].deflection_deg});
   }
   return out;
 }

@@ -63,7 +63,7 @@ struct IntegratedInput {
   double rate = 0.2;         ///< xi [1/s]: fraction of the travel per second at j = 1; not 0; negative reverses
   double dead_zone = 0.1;    ///< [0, 1)
   double low = -1.0, high = 1.0;
-  double initial = 0.0;         ///< in [low, high]
+  double initial = 0.0;         ///< in [low, high]; where it begins, also when the device comes back
   std::vector<double> detents;  ///< rising; the output snaps to the nearest one; empty: none
   /// Inputs of one axis or button pair share it: a press of this button selects this one, the first is selected at the
   /// start. -1: the only one.
@@ -120,6 +120,9 @@ struct JoystickOptions {
   std::vector<ActionButton> actions;
   ModeButtons mode;
 };
+
+/// Whether both are driven by one axis or button pair.
+bool sameSource(const IntegratedInput& a, const IntegratedInput& b, StickMode mode);
 
 /// First thing wrong, with key, given value and expectation.
 std::optional<std::string> validate(const JoystickOptions& options);
@@ -220,10 +223,12 @@ class JoystickMapper {
   void checkButton(int button, const std::string& key, std::size_t count);
   bool check(const std::vector<float>& axes, std::size_t button_count);
   std::optional<double> axis(int index) const;
-  bool held(int button) const;     // as the device says
-  bool pressed(int button) const;  // debounced
+  bool lacksAxis(AxisIndex wanted) const;  // false where none is wanted
+  bool held(int button) const;             // as the device says
+  bool pressed(int button) const;          // debounced
   template <class Input>
   double source(const Input& input) const;
+  void startAnew(double now);
   void integrateUpTo(double now);
   void settleButtons(double now, bool edges);
   void settleHats(double now, bool edges);
@@ -232,7 +237,6 @@ class JoystickMapper {
 
   void moveSurface(double dt);
   void chooseSurface(int button);
-  void releaseSurfaces();
 
   JoystickOptions options_;
   std::vector<double> axes_;

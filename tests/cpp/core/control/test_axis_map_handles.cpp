@@ -118,12 +118,24 @@ TEST_F(AxisMapHandles, ButtonAsksAgainForWhatTheHatCommands) {
 }
 
 TEST_F(AxisMapHandles, HatHeldWhenTheDeviceAppearsIsNotPushed) {
+  hold(-1.0f, -1);
+  EXPECT_EQ(hold(-1.0f, -1).flaps, 0.0) << "at its end";
   rest();
+  expectNudged(hold(-1.0f, -1).flaps, 0.0);
+}
+
+TEST_F(AxisMapHandles, ADeviceThatComesBackCommandsNoHandleUntilItIsUsedAgain) {
+  rest();
+  hold(0.0f, 0);
   hold(1.0f, -1, 2.5);
-  now_ += 5.0;
-  EXPECT_EQ(hold(1.0f, -1).flaps, 1.0);
+  EXPECT_EQ(rest().fields, static_cast<std::uint32_t>(kFieldGear | kFieldFlaps));
+  now_ += 3.0;  // in which the pilot lowers the gear in the cockpit
+  EXPECT_EQ(rest().fields, 0u);
+  const ControlCommand gear = hold(0.0f, 0);
+  EXPECT_EQ(gear.fields, static_cast<std::uint32_t>(kFieldGear));
+  EXPECT_EQ(gear.gear, 0.0) << "the command begins";
   rest();
-  expectNudged(hold(1.0f, -1).flaps, 1.0);
+  EXPECT_EQ(hold(1.0f, -1).flaps, 0.0) << "from where the integral begins";
 }
 
 }  // namespace

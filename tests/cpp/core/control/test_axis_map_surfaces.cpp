@@ -123,6 +123,32 @@ TEST(JoySurfaces, ASecondPressGivesItBack) {
   EXPECT_TRUE(mapper.selected().empty());
 }
 
+TEST(JoySurfaces, OneWhoseAxisTheDeviceLacksIsNotCommanded) {
+  JoystickOptions o = ailerons();
+  o.surfaces[0].axis = {3, 3};
+  o.surfaces[0].low = -60.0;
+  JoystickMapper mapper(o);
+  double now = 0.0;
+  hold(&mapper, 0.0F, {0, 0}, &now);
+  hold(&mapper, 0.0F, {0, 1}, &now);
+  EXPECT_EQ(textOf(hold(&mapper, 0.0F, {1, 0}, &now)), "aileron1_wing2_right 0 ");
+  ASSERT_EQ(mapper.problems().size(), 1U);
+  EXPECT_NE(mapper.problems()[0].text.find("it is not commanded"), std::string::npos);
+  EXPECT_EQ(mapper.selected(), std::vector<std::string>{"surfaces.aileron1_wing2_right"}) << "that stays chosen";
+}
+
+TEST(JoySurfaces, OneWhoseAxisIsMissingForAWhileIsLeftWhereItWasSet) {
+  JoystickMapper mapper(ailerons());
+  double now = 0.0;
+  hold(&mapper, 0.0F, {0, 0}, &now);
+  hold(&mapper, 0.0F, {1, 0}, &now);
+  EXPECT_EQ(textOf(hold(&mapper, 1.0F, {0, 0}, &now)), "aileron1_wing2_left 150 ");
+  EXPECT_TRUE(mapper.onJoy({}, {0, 0}, now));
+  EXPECT_TRUE(mapper.update(now + 0.02).surfaces.empty());
+  EXPECT_TRUE(mapper.onJoy({}, {1, 0}, now + 0.02));  // a second press gives it back
+  EXPECT_TRUE(mapper.selected().empty());
+}
+
 TEST(JoySurfaces, ADeviceThatComesBackHasNoneChosen) {
   JoystickMapper mapper(ailerons());
   double now = 0.0;
