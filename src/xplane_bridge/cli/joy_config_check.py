@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import collections
+import itertools
 import os
 import re
 import shutil
@@ -15,6 +16,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from textwrap import wrap
 from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
 
 from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
@@ -200,7 +202,9 @@ class _Check:
     @staticmethod
     def _draw(lines: Sequence[str]) -> None:
         columns, rows = shutil.get_terminal_size()
-        visible = [line[:columns] + _CLEAR_LINE for line in lines[: rows - 1]]
+        # A table is cut off at the edge, what is wrong is not: a file's path may fill a line.
+        parts = [wrap(line, columns) if line.startswith("ERROR: ") else [line[:columns]] for line in lines]
+        visible = [line + _CLEAR_LINE for line in list(itertools.chain.from_iterable(parts))[: rows - 1]]
         print(_HOME + "\n".join(visible) + _CLEAR_BELOW, end="", flush=True)
 
     def _picture(self) -> Live:

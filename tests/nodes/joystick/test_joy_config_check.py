@@ -121,9 +121,13 @@ def test_on_a_terminal_it_follows_the_stick_and_the_file(world, stick):
         file.write_text(FILE.replace("scale: -1.0", "scale: 0.5"), encoding="utf-8")
         wait_until(lambda: shows(r"roll \+0\.500 "), WAIT_S, "command by the file saved anew")
         file.write_text(FILE.replace("scale", "scal"), encoding="utf-8")
-        wait_until(lambda: shows(r"ERROR: .*direct\.roll\.scal "), WAIT_S, "error of the file saved anew")
+        wait_until(lambda: shows(r"(?s)ERROR: .*direct\.roll\.scal\s"), WAIT_S, "error of the file saved anew")
         file.write_text(f"{FILE}buttons: {{1: {{button: 0}}}}\n", encoding="utf-8")
-        wait_until(lambda: shows(r"ERROR: .*buttons\.1 is a key that is no text"), WAIT_S, "key that ROS cannot set")
+        wait_until(
+            lambda: shows(r"(?s)ERROR: .*buttons\.1\s+is\s+a\s+key\s+that\s+is\s+no\s+text"),
+            WAIT_S,
+            "key that ROS cannot set",
+        )
         file.write_text(f"{FILE}buttons:\n  # none\n", encoding="utf-8")
         wait_until(lambda: shows(r"roll -1\.000 "), WAIT_S, "command by a file with a section of comments only")
         run.send_signal(signal.SIGINT)
