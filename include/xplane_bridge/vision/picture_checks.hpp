@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -20,35 +21,56 @@ namespace xplane_bridge::vision {
 class FrozenCheck {
  public:
   /// @param after_ns [ns] for how long the picture must have stood still while the state moved, > 0
-  explicit FrozenCheck(std::int64_t after_ns) : after_ns_(after_ns) {}
+  explicit FrozenCheck(std::int64_t after_ns) : after_ns_(after_ns), pause_ns_(std::max(after_ns, kPauseNs)) {}
 
   /// The picture changed.
   void pictureChanged() {
-    looked_at_ = true;
+    ever_ = true;
+    beginAnew(0);
+  }
+
+  /// No pictures are looked at for now, or there are none: nothing is known of them until the next, or beginAnew().
+  void interrupt() { looked_at_ = false; }
+
+  /// Pictures are looked at again: what has stood since before counts from then on, if there ever was a picture.
+  /// @param from_ns [ns] movements before do not count
+  void beginAnew(std::int64_t from_ns) {
+    looked_at_ = ever_;
+    from_ns_ = from_ns;
     moving_since_ns_.reset();
   }
 
-  /// No pictures are looked at for now, or there are none: nothing is known of them until the next.
-  void interrupt() { looked_at_ = false; }
-
   /// The flight state moved (attitude or position clearly different from before).
   void stateMoved(std::int64_t now_ns) {
-    // After a pause, the first state that moves comes before the first picture that does.
-    if (!moving_since_ns_ || now_ns - moved_at_ns_ >= after_ns_) moving_since_ns_ = now_ns;
+    if (now_ns < from_ns_) return;
+    if (!moving_since_ns_ || now_ns - moved_at_ns_ >= pause_ns_) {
+      moving_since_ns_ = now_ns;
+      longest_gap_ns_ = 0;
+    } else {
+      longest_gap_ns_ = std::max(longest_gap_ns_, now_ns - moved_at_ns_);
+    }
     moved_at_ns_ = now_ns;
   }
 
   /// True when the state has moved for longer than the limit, and still moves, while the picture stood still.
   [[nodiscard]] bool frozen(std::int64_t now_ns) const {
-    return looked_at_ && moving_since_ns_ && now_ns - *moving_since_ns_ > after_ns_ &&
-           now_ns - moved_at_ns_ < after_ns_;
+    // The longest gap may be a short pause, after which the first state that moves comes before the first picture that
+    // does: it does not count.
+    return looked_at_ && moving_since_ns_ && moved_at_ns_ - *moving_since_ns_ - longest_gap_ns_ > after_ns_ &&
+           now_ns - moved_at_ns_ < pause_ns_;
   }
 
  private:
+  static constexpr std::int64_t kPauseNs = 2'000'000'000;  // a slow aircraft moves more often
+
   std::int64_t after_ns_;
+  std::int64_t pause_ns_;  // a state that stands for so long moves no more
+  bool ever_ = false;      // there was a picture
   bool looked_at_ = false;
+  std::int64_t from_ns_ = 0;
   std::optional<std::int64_t> moving_since_ns_;  // without a pause since the picture last changed
   std::int64_t moved_at_ns_ = 0;
+  std::int64_t longest_gap_ns_ = 0;  // between two movements since then
 };
 
 /// Finds out when a picture that stands, as in a pause, has to be shown to those who came after its last change: once,

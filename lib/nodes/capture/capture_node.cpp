@@ -161,11 +161,13 @@ void CaptureNode::noteSource(const vision::FrameSource& source, bool described) 
     logged_problem_ = problem;
   }
   const std::lock_guard<std::mutex> lock(capture_mutex_);
-  source_problem_ = problem;
   if (!problem.empty()) {
     periods_.interrupt();
     frozen_check_.interrupt();
+  } else if (!source_problem_.empty()) {
+    frozen_check_.beginAnew(pairingNow() + kEyeReportsNs);
   }
+  source_problem_ = problem;
   // Asking the window for its title costs a round trip; only where it may have changed.
   if (described || source_description_.empty()) source_description_ = source.describe();
 }

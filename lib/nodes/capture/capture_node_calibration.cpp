@@ -140,7 +140,7 @@ std::string CaptureNode::calibrateSender() {
   link().waitUntil(answered, kSenderAnswers);
   {
     const std::lock_guard<std::mutex> lock(capture_mutex_);
-    frozen_check_.interrupt();
+    frozen_check_.beginAnew(pairingNow() + kEyeReportsNs);
     calibrating_ = false;
   }
   // Not what the eye has seen before its steps, where the node that changed it has ended meanwhile.
@@ -168,9 +168,11 @@ double CaptureNode::fieldOfViewToChange() {
   const auto stands = [this, &own] {
     const std::lock_guard<std::mutex> lock(camera_mutex_);
     own = camera_known_ ? field_of_view_deg_ : std::numeric_limits<double>::quiet_NaN();
-    return !std::isfinite(own) || core::toSeconds(field_of_view_heard_ns_ - field_of_view_since_ns_) >= kStands;
+    return stopping() || !std::isfinite(own) ||
+           core::toSeconds(field_of_view_heard_ns_ - field_of_view_since_ns_) >= kStands;
   };
   const bool stood = link().waitUntil(stands, kStandsWithin);
+  if (stopping()) throw std::runtime_error("the node is stopping");
   if (!std::isfinite(own)) {
     throw std::runtime_error("X-Plane does not say its field of view: is it heard (link_state)?");
   }

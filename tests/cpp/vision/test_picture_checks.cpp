@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/core.hpp>
+#include <utility>
+#include <vector>
 
 namespace vision = xplane_bridge::vision;
 
@@ -77,30 +79,75 @@ TEST(FrozenCheck, NeedsAPictureThatStandsForTheTimeThatTheStateMoves) {
   EXPECT_FALSE(check.frozen(100 * kTenth)) << "no picture yet";
   check.pictureChanged();
   EXPECT_FALSE(check.frozen(120 * kTenth)) << "nothing moves: the picture may stand";
-  moveState(check, 121, 131);
-  EXPECT_FALSE(check.frozen(131 * kTenth)) << "not longer than the limit";
-  EXPECT_TRUE(check.frozen(131 * kTenth + 1));
-  EXPECT_FALSE(check.frozen(141 * kTenth)) << "the state has stopped";
-  moveState(check, 132, 140);
+  moveState(check, 121, 132);
+  EXPECT_FALSE(check.frozen(132 * kTenth)) << "not longer than the limit";
+  moveState(check, 133, 133);
+  EXPECT_TRUE(check.frozen(133 * kTenth));
+  EXPECT_FALSE(check.frozen(153 * kTenth)) << "the state has stopped";
+  moveState(check, 134, 140);
   EXPECT_TRUE(check.frozen(141 * kTenth));
   check.pictureChanged();
   EXPECT_FALSE(check.frozen(141 * kTenth + 1));
-  moveState(check, 142, 150);
-  EXPECT_FALSE(check.frozen(151 * kTenth)) << "not standing long enough";
-  moveState(check, 151, 153);
-  EXPECT_TRUE(check.frozen(153 * kTenth));
+  moveState(check, 142, 153);
+  EXPECT_FALSE(check.frozen(153 * kTenth)) << "not standing long enough";
+  moveState(check, 154, 154);
+  EXPECT_TRUE(check.frozen(154 * kTenth));
   check.interrupt();  // no subscriber
-  EXPECT_FALSE(check.frozen(153 * kTenth));
+  EXPECT_FALSE(check.frozen(154 * kTenth));
+}
+
+TEST(FrozenCheck, APictureThatStandsOverAnInterruptionIsFoundFrozenAgain) {
+  vision::FrozenCheck check(10 * kTenth);
+  check.beginAnew(0);
+  moveState(check, 1, 30);
+  EXPECT_FALSE(check.frozen(30 * kTenth)) << "there was no picture ever";
+  check.pictureChanged();
+  moveState(check, 31, 50);
+  EXPECT_TRUE(check.frozen(50 * kTenth));
+  check.interrupt();  // the sender is gone
+  moveState(check, 51, 80);
+  EXPECT_FALSE(check.frozen(80 * kTenth));
+  check.beginAnew(95 * kTenth);  // it is back, and has not said yet whether it has pictures
+  moveState(check, 81, 106);
+  EXPECT_FALSE(check.frozen(106 * kTenth)) << "movements before that do not count";
+  moveState(check, 107, 107);
+  EXPECT_TRUE(check.frozen(107 * kTenth));
+  check.interrupt();
+  check.beginAnew(200 * kTenth);
+  check.pictureChanged();
+  moveState(check, 110, 122);
+  EXPECT_TRUE(check.frozen(122 * kTenth)) << "a picture says as much as its sender";
+}
+
+TEST(FrozenCheck, FindsAFrozenPictureHoweverSlowlyTheStateMoves) {
+  constexpr std::int64_t kMillisecond = 1'000'000;
+  const std::vector<std::pair<std::int64_t, std::int64_t>> cases{{50, 40},    {50, 50},     {50, 60},     {200, 250},
+                                                                 {1000, 900}, {1000, 1000}, {1000, 1100}, {3000, 2500}};
+  for (const auto& [after, period] : cases) {  // [ms]
+    vision::FrozenCheck check(after * kMillisecond);
+    check.pictureChanged();
+    for (int i = 0; i < 2; ++i) check.stateMoved(i * period * kMillisecond);
+    EXPECT_FALSE(check.frozen(period * kMillisecond)) << after << ' ' << period << ": may be a short pause";
+    for (int i = 2; i < 60; ++i) check.stateMoved(i * period * kMillisecond);
+    for (std::int64_t at = 59 * period; at < 60 * period; at += 5) {
+      EXPECT_TRUE(check.frozen(at * kMillisecond)) << after << ' ' << period << " at " << at;
+    }
+  }
 }
 
 TEST(FrozenCheck, AMovementThatHasJustBegunIsNotInThePictureYet) {
   vision::FrozenCheck check(10 * kTenth);
   check.pictureChanged();
-  moveState(check, 1, 1);                                          // the last frame before a pause
+  moveState(check, 1, 1);  // the last frame before a pause
+  EXPECT_FALSE(check.frozen(12 * kTenth)) << "it has not moved since";
   for (std::int64_t resumed = 50; resumed < 250; resumed += 50) {  // or an aircraft that is placed
     moveState(check, resumed, resumed + 2);
     EXPECT_FALSE(check.frozen((resumed + 3) * kTenth)) << "after " << resumed;
   }
-  moveState(check, 300, 311);
-  EXPECT_TRUE(check.frozen(311 * kTenth)) << "it lasts, and the picture still stands";
+  check.pictureChanged();
+  moveState(check, 299, 299);
+  moveState(check, 314, 316);
+  EXPECT_FALSE(check.frozen(316 * kTenth)) << "after a pause of 1.5 s";
+  moveState(check, 317, 325);
+  EXPECT_TRUE(check.frozen(325 * kTenth)) << "it lasts, and the picture still stands";
 }

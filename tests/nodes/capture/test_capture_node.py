@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import sys
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -310,49 +309,6 @@ def test_lost_window_is_said_and_found_again(world, display) -> None:
     images.wait_for_next(timeout=WAIT_S)
     states.wait_for_next(timeout=WAIT_S)
     node.check_running()
-
-
-def test_a_picture_that_stands_is_an_error_unless_the_aircraft_has_crashed(world, display) -> None:
-    """A window in which nothing happens; the state that moves is the test's."""
-    import rospy
-    from xplane_bridge.msg import FlightState, WarningState
-
-    program = [sys.executable, "-c", f"import tkinter; root = tkinter.Tk(); root.title({STILL!r}); root.mainloop()"]
-    still = ManagedProcess("still", program, world.folder)
-    world.point_to(9)  # nothing answers there
-    capture(world, display, window={"display": display, "search_period": 0.05, "title": STILL})
-    (images,) = watch(world, "image")
-    state = rospy.Publisher(f"{world.namespace}/flight_state", FlightState, queue_size=1)
-    warnings = rospy.Publisher(f"{world.namespace}/mission/warnings", WarningState, queue_size=1, latch=True)
-    wait_until(lambda: state.get_num_connections() and warnings.get_num_connections(), WAIT_S, "capture_node's ear")
-    ended = threading.Event()
-
-    def move() -> None:
-        roll = 0.0
-        while not ended.wait(0.05):
-            roll += 1.0
-            state.publish(FlightState(roll_deg=roll % 90.0))
-
-    mover = threading.Thread(target=move)
-    mover.start()
-    try:
-        still.start()
-        images.wait_for(timeout=WAIT_S)
-        frozen = world.wait_for_diagnostics("capture", lambda s: s.level == 2, timeout=WAIT_S)
-        assert frozen.message == "frozen: the aircraft moves, the picture does not"
-        warnings.publish(WarningState(crashed=1.0))
-        crashed = world.wait_for_diagnostics("capture", lambda s: "crashed" in s.message, timeout=WAIT_S)
-        assert (crashed.level, crashed.message) == (1, "the picture stands still: the aircraft has crashed")
-        warnings.publish(WarningState(crashed=0.0))
-        world.wait_for_diagnostics("capture", lambda s: s.level == 2, timeout=WAIT_S)
-        still.stop()
-        world.wait_for_diagnostics("capture", lambda s: s.message.startswith("no picture: "), timeout=WAIT_S)
-        with pytest.raises(HarnessError):  # twice the time between repetitions of a picture that stands
-            images.wait_for_next(timeout=2.0)
-    finally:
-        ended.set()
-        mover.join()
-        still.stop()
 
 
 def test_a_black_picture_is_reported(world, display) -> None:

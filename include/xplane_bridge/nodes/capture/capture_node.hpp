@@ -67,6 +67,8 @@ class CaptureNode : public BaseNode {
 
  private:
   static constexpr const char* kFieldOfViewPurpose = "field_of_view";  ///< of the journal's entry, and its id
+  /// [ns] Within so long an xplane_eye reports why it has no pictures, twice a second.
+  static constexpr std::int64_t kEyeReportsNs = 1'500'000'000;
 
   /// A picture on its way from the source to the topics.
   struct Grabbed {
