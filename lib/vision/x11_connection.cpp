@@ -221,20 +221,24 @@ X11Connection::Found X11Connection::findWindow(const X11SourceOptions& options) 
   using Rank = std::pair<bool, bool>;  // X-Plane's, exact title
   Rank best_rank{false, false};
   std::vector<xcb_window_t> best;
+  std::vector<std::pair<Rank, xcb_window_t>> ranked;
   for (const xcb_window_t window : allWindows()) {
     const std::string text = title(window);
     const bool wanted = fits(window, options, text);
+    // Of a class without a title no window has the exact one, least of all a menu that has none itself.
+    const Rank rank{wanted && isXPlanes(window), !options.title.empty() && text == options.title};
+    if (wanted) ranked.emplace_back(rank, window);
     if ((!wanted && text.empty()) || !viewable(window)) continue;
     if (!text.empty()) found.titles.push_back(text);
-    if (!wanted || area(window) == 0) continue;
-    // Of a class without a title no window has the exact one, least of all a menu that has none itself.
-    const Rank rank{isXPlanes(window), !options.title.empty() && text == options.title};
-    if (rank < best_rank) continue;
+    if (!wanted || area(window) == 0 || rank < best_rank) continue;
     if (rank > best_rank) best.clear();
     best_rank = rank;
     best.push_back(window);
   }
   found.alike = best;
+  for (const auto& [rank, window] : ranked) {
+    if (rank <= best_rank) found.beside.push_back(window);
+  }
   if (options.point.has_value()) {
     const auto elsewhere = [&](xcb_window_t window) { return !covers(window, *options.point); };
     best.erase(std::remove_if(best.begin(), best.end(), elsewhere), best.end());

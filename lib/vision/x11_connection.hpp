@@ -55,8 +55,9 @@ class X11Connection {
 
   struct Found {
     std::optional<xcb_window_t> window;
-    std::vector<xcb_window_t> alike;  ///< those that fit as well, this one included
-    std::vector<std::string> titles;  ///< of all viewable windows that have one
+    std::vector<xcb_window_t> alike;   ///< those that fit as well, this one included
+    std::vector<xcb_window_t> beside;  ///< also those that are hidden or fit less well, but none that fits better
+    std::vector<std::string> titles;   ///< of all viewable windows that have one
   };
   /// Viewable window that fits best, see X11SourceOptions.
   [[nodiscard]] Found findWindow(const X11SourceOptions& options) const;

@@ -102,8 +102,8 @@ class X11WindowSource::Impl {
     std::ostringstream text;
     text << wanted_ << ": " << hex(target_.window);
     if (options_.region.empty()) text << " \"" << connection_->title(target_.window) << "\"";
-    if (alike_.size() > 1 && options_.index < 0 && !options_.point.has_value()) {
-      text << ", the largest of " << alike_.size() << " that are alike (the window's index or point chooses one)";
+    if (alike_ > 1 && options_.index < 0 && !options_.point.has_value()) {
+      text << ", one of " << alike_ << " that are alike (the window's index or point chooses one)";
     }
     text << " on display " << connection_->displayName() << ", " << grabber_->area().width << "x"
          << grabber_->area().height << ", depth " << target_.format.depth
@@ -208,7 +208,7 @@ class X11WindowSource::Impl {
         connection_ = std::make_unique<X11Connection>(options_.display);
         server_clock_.reset();
         chosen_ = XCB_NONE;
-        alike_.clear();
+        beside_.clear();
         // So that also the first drawings have their time, however late they are seen.
         connection_->askTime(kTimesAsked, [this](std::uint32_t ms) { (void)server_clock_.toHost(ms, clock_()); });
       } catch (const std::runtime_error& error) {
@@ -237,12 +237,13 @@ class X11WindowSource::Impl {
       return false;
     }
     chosen_ = *found.window;
-    alike_ = std::move(found.alike);
+    alike_ = found.alike.size();
+    beside_ = std::move(found.beside);
     return open(chosen_);
   }
 
   // Where one of several windows alike goes, numbers and sizes choose another, which shows another view.
-  [[nodiscard]] bool wasBeside(xcb_window_t window) const { return window != chosen_ && contains(alike_, window); }
+  [[nodiscard]] bool wasBeside(xcb_window_t window) const { return window != chosen_ && contains(beside_, window); }
 
   bool open(xcb_window_t window) {
     const std::uint32_t events = XCB_EVENT_MASK_STRUCTURE_NOTIFY | XCB_EVENT_MASK_VISIBILITY_CHANGE;
@@ -452,10 +453,11 @@ class X11WindowSource::Impl {
 
   X11SourceOptions options_;
   Clock clock_;
-  std::string wanted_;               // the window or region, in words
-  std::string problem_;              // empty while there is a picture
-  xcb_window_t chosen_ = XCB_NONE;   // the last that was captured
-  std::vector<xcb_window_t> alike_;  // windows that fitted as well, this one included
+  std::string wanted_;                // the window or region, in words
+  std::string problem_;               // empty while there is a picture
+  xcb_window_t chosen_ = XCB_NONE;    // the last that was captured
+  std::size_t alike_ = 0;             // windows that fitted as well, this one included
+  std::vector<xcb_window_t> beside_;  // all that were there then, hidden ones too
   std::unique_ptr<X11Connection> connection_;
   Target target_;
   std::unique_ptr<X11Grabber> grabber_;

@@ -54,7 +54,7 @@ class Grabber:
         self._titles = titles
         self._which = which
         self._taken: Any = None
-        self._beside: List[Any] = []  # the one taken among them
+        self._beside: List[Any] = []  # what had the title when it was taken, shown or not, itself included
         self._take = take
         self._stop = threading.Event()
         self._thread: Optional[threading.Thread] = None
@@ -78,11 +78,15 @@ class Grabber:
         """By which a window is known again when it has moved."""
         return window
 
-    def _chosen(self, windows: Sequence[Tuple[Rect, W]]) -> Optional[W]:
-        """The window that is asked for, of those that fit; says why there is none, and that there are several.
+    def _chosen(self, windows: Sequence[Tuple[Rect, W]], titled: Sequence[W]) -> Optional[W]:
+        """The window that is asked for; says why there is none, and that there are several.
 
         The one that was taken is taken again, wherever it is by now and whatever its size. Where it goes, numbers and
         sizes choose another of several, which shows another view: that is not taken.
+
+        Args:
+            windows: Those to choose from, at least one, with their places.
+            titled: All of the title, also those that cannot be chosen now, as they are minimised or not X-Plane's.
         """
         known = [window for _, window in windows if self._number_of(window) == self._taken]
         found = known[0] if known else self._fitting(windows)
@@ -96,13 +100,13 @@ class Grabber:
             )
             return None
         self._taken = number
-        self._beside = [self._number_of(window) for _, window in windows]
+        self._beside = [self._number_of(window) for window in titled]
+        several = self._which is None and len(windows) > 1
+        self.remark = f"the window is one of {len(windows)} that are alike; --window chooses" if several else ""
         return found
 
     def _fitting(self, windows: Sequence[Tuple[Rect, W]]) -> Optional[W]:
         if self._which is None:
-            count = len(windows)
-            self.remark = f"{count} windows are alike: the largest is taken, --window chooses" if count > 1 else ""
             return max(windows, key=lambda window: window[0][2] * window[0][3])[1]
         ordered = sorted(windows, key=lambda window: window[0][:2])
         if isinstance(self._which, tuple):

@@ -189,7 +189,7 @@ class LinuxGrabber(Grabber):
         fitting = [window for window in alike if is_xplane(window.program)] or alike
         shown = [window for window in fitting if window.shown]
         if shown:
-            return self._chosen([(self._place(window), window) for window in shown])
+            return self._chosen([(self._place(window), window) for window in shown], alike)
         self.problem = (
             MINIMISED
             if fitting

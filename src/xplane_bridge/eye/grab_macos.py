@@ -119,9 +119,9 @@ class MacGrabber(Grabber):
         self._kit.SCShareableContent.getShareableContentWithCompletionHandler_(take)
         if not answered.wait(_ANSWER_S) or not found:
             return None
-        fitting = [(_place(window), window) for window in found if window.title() in self._titles]
+        fitting = [window for window in found if window.title() in self._titles]
         if fitting:
-            return self._chosen(fitting)
+            return self._chosen([(_place(window), window) for window in fitting], fitting)
         self.problem = self._no_window(tuple(str(window.title()) for window in found if window.title()))
         return None
 

@@ -160,7 +160,7 @@ class WindowsGrabber(Grabber):
         # Windows has minimised ones far left of every screen: they would come first by number.
         shown = [window for window in own if not self._desktop.minimised(window)]
         if shown:
-            return self._chosen([(self._desktop.place(window), window) for window in shown])
+            return self._chosen([(self._desktop.place(window), window) for window in shown], own)
         if own:
             self.problem = MINIMISED
         elif fitting:

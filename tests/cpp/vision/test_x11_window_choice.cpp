@@ -60,7 +60,7 @@ TEST_F(X11WindowSourceTest, OfWindowsAlikeTheIndexChoosesFromTheLeft) {
   X11WindowSource largest(titled(server_, ""), steadyNow);
   ASSERT_TRUE(nextPicture(largest, picture_));
   EXPECT_EQ(largest.window(), right.id());
-  EXPECT_NE(largest.describe().find("the largest of 3 that are alike"), std::string::npos) << largest.describe();
+  EXPECT_NE(largest.describe().find(", one of 3 that are alike"), std::string::npos) << largest.describe();
   int index = 0;
   for (const TestWindow* window : {&left, &below, &right}) {
     X11SourceOptions options = titled(server_, "");
@@ -185,5 +185,34 @@ TEST_F(X11WindowSourceTest, PrefersTheWindowWhoseProcessIsXPlane) {
   const bool found = nextPicture(source, picture_);
   prctl(PR_SET_NAME, before);
   ASSERT_TRUE(found);
+  EXPECT_EQ(source.window(), window.id());
+  window.unmap();
+  EXPECT_TRUE(becomesLost(source));
+  EXPECT_TRUE(saysSo(source, "was there beside it and is not taken in its place")) << source.problem();
+}
+
+TEST_F(X11WindowSourceTest, OneThatWasHiddenBesideTheCapturedOneDoesNotTakeItsPlace) {
+  TestWindow captured(server_.display(), "X-System", 320, 240, 10, 20);
+  TestWindow other(server_.display(), "X-System", 200, 160, 400, 0);
+  other.unmap();
+  X11WindowSource source(titled(server_, ""), steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
+  ASSERT_EQ(source.window(), captured.id());
+  captured.unmap();
+  other.map();
+  EXPECT_TRUE(becomesLost(source));
+  EXPECT_TRUE(saysSo(source, "was there beside it and is not taken in its place")) << source.problem();
+}
+
+TEST_F(X11WindowSourceTest, OneThatWasHiddenAndFitsBetterTakesTheCapturedOnesPlace) {
+  TestWindow editor(server_.display(), "notes on X-System - editor", 320, 240);
+  TestWindow window(server_.display(), "X-System", 200, 160);
+  window.unmap();
+  X11WindowSource source(titled(server_), steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
+  ASSERT_EQ(source.window(), editor.id());
+  editor.unmap();
+  window.map();
+  ASSERT_TRUE(nextPicture(source, picture_)) << source.problem();
   EXPECT_EQ(source.window(), window.id());
 }

@@ -236,3 +236,20 @@ def test_of_windows_alike_that_of_x_planes_own_process_is_taken(
     grabber.problem = ""
     assert grabber._find() == (None if found is None else seen[found])
     assert grabber.problem == problem
+
+
+def test_a_file_manager_of_its_title_does_not_take_the_place_of_x_planes_window(
+    display: str, monkeypatch: pytest.MonkeyPatch
+):
+    flight = Window("X-Plane", *SMALL, program="X-Plane-x86_64", number=1)
+    folder = Window("X-Plane", *LARGE, program="nautilus", number=2)
+    seen = [flight, folder]
+    monkeypatch.setattr(grab_linux.windows, "observe", lambda *_: Display(display, tuple(seen)))
+    grabber = LinuxGrabber(("X-Plane",), None, lambda *_: None)
+    assert grabber._find() == flight
+    seen.remove(flight)  # X-Plane has ended
+    assert grabber._find() is None
+    assert grabber.problem.startswith("the window that was captured is hidden or closed, and another that was there")
+    restarted = Window("X-Plane", *SMALL, program="X-Plane-x86_64", number=3)
+    seen.append(restarted)
+    assert grabber._find() == restarted

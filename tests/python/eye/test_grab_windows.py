@@ -157,6 +157,30 @@ def test_a_capture_that_fails_is_said_and_begun_again(
 MINIMISED_PLACE = -32000, -32000, 160, 28  #: where GetWindowRect says that it is
 
 
+class Two(Desktop):
+    """Windows of X-Plane side by side, some of them minimised."""
+
+    def __init__(self) -> None:
+        self.shown, self.hidden = [7, 8], []
+
+    def windows(self) -> list:
+        return [(window, "X-Plane") for window in sorted(self.shown + self.hidden)]
+
+    def minimised(self, window: int) -> bool:
+        return window in self.hidden
+
+    def place(self, window: int) -> tuple:
+        return MINIMISED_PLACE if window in self.hidden else (1920 * (window - 7), 0, 1920, 1080)
+
+
+def choosing(monkeypatch: pytest.MonkeyPatch, desktop: Two, which: Any) -> WindowsGrabber:
+    monkeypatch.setitem(sys.modules, "windows_capture", types.SimpleNamespace())
+    monkeypatch.setattr(grab_windows, "_Desktop", lambda: desktop)
+    grabber = WindowsGrabber(("X-Plane",), which, lambda *_: None)
+    grabber.problem = ""
+    return grabber
+
+
 @pytest.mark.parametrize(
     ("minimised", "which", "found", "problem"),
     [
@@ -171,19 +195,24 @@ MINIMISED_PLACE = -32000, -32000, 160, 28  #: where GetWindowRect says that it i
 def test_a_minimised_window_is_not_the_leftmost(
     monkeypatch: pytest.MonkeyPatch, minimised: tuple, which: Any, found: Any, problem: str
 ):
-    class Two(Desktop):
-        def windows(self) -> list:
-            return [(7, "X-Plane"), (8, "X-Plane")]
-
-        def minimised(self, window: int) -> bool:
-            return window in minimised
-
-        def place(self, window: int) -> tuple:
-            return MINIMISED_PLACE if window in minimised else (1920 * (window - 7), 0, 1920, 1080)
-
-    monkeypatch.setitem(sys.modules, "windows_capture", types.SimpleNamespace())
-    monkeypatch.setattr(grab_windows, "_Desktop", Two)
-    grabber = WindowsGrabber(("X-Plane",), which, lambda *_: None)
-    grabber.problem = ""
+    desktop = Two()
+    desktop.shown, desktop.hidden = [n for n in (7, 8) if n not in minimised], list(minimised)
+    grabber = choosing(monkeypatch, desktop, which)
     assert grabber._find() == found
     assert grabber.problem == problem
+
+
+@pytest.mark.parametrize("which", [0, None])
+def test_a_window_that_was_minimised_beside_the_taken_one_does_not_take_its_place(
+    monkeypatch: pytest.MonkeyPatch, which: Any
+):
+    desktop = Two()
+    desktop.shown, desktop.hidden = [7], [8]
+    grabber = choosing(monkeypatch, desktop, which)
+    assert grabber._find() == 7
+    desktop.shown, desktop.hidden = [8], []  # one closed, the other restored
+    assert grabber._find() is None
+    assert grabber.problem.startswith("the window that was captured is hidden or closed, and another that was there")
+    desktop.shown = [8, 9]
+    desktop.place = lambda window: (0, 0, 1920, 1080) if window == 9 else (1920, 0, 800, 600)  # type: ignore
+    assert grabber._find() == 9, "opened anew"

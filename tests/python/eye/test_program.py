@@ -108,7 +108,7 @@ class Windows(Grabber):
     """Chooses as the grabbers do."""
 
     def choose(self, *windows: tuple) -> object:
-        return self._chosen([(place, name) for place, name in windows])
+        return self._chosen([(place, name) for place, name in windows], [name for _, name in windows])
 
 
 LEFT, BELOW, RIGHT = ((10, 20, 100, 80), "left"), ((10, 300, 200, 160), "below"), ((400, 0, 320, 240), "right")
@@ -121,7 +121,11 @@ def test_of_windows_alike_the_number_chooses_from_the_left():
         assert windows.remark == ""
     largest = Windows((), None, lambda *_: None)
     assert largest.choose(LEFT, RIGHT, BELOW) == "right"
-    assert largest.remark == "3 windows are alike: the largest is taken, --window chooses"
+    assert largest.remark == "the window is one of 3 that are alike; --window chooses"
+    assert largest.choose(LEFT, RIGHT) == "right"
+    assert largest.remark == "the window is one of 2 that are alike; --window chooses"
+    assert largest.choose(RIGHT) == "right"
+    assert largest.remark == ""
     alone = Windows((), None, lambda *_: None)
     assert alone.choose(LEFT) == "left"
     assert alone.remark == ""
