@@ -59,6 +59,8 @@ class Sender:
         self._next: Optional[Decision] = None
         self._problem = ""
         self._unsendable = ""  # why the newest picture cannot be sent
+        self._size: Tuple[int, ...] = ()  # of the newest picture [px]
+        self._warned = False  # that one of this size cannot be sent: some JPEGs of a size may be too large, others not
         self._stop = False
         # Windows waits for sockets only: a pair of them wakes the thread.
         self._waker, self._awake = socket.socketpair()
@@ -238,11 +240,15 @@ class _Session:
             decision, self._sender._next = self._sender._next, None
         if decision is None:
             return
+        size = decision.picture.shape[:2]
+        if size != self._sender._size:
+            self._sender._size, self._sender._warned = size, False
         try:
             message = self._message(decision)
         except wire.WireError as error:  # one of another size may follow
-            if not self._sender._unsendable:
+            if not self._sender._warned:
                 self._sender._say(str(error))
+            self._sender._warned = True
             self._sender._unsendable = str(error)
             return
         self._sender._unsendable = ""

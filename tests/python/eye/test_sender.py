@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from xplane_bridge.eye import sender as sender_module
+from xplane_bridge.eye import wire
 from xplane_bridge.eye.jpeg import encoder
 from xplane_bridge.eye.pairing import Decision, Frame
 from xplane_bridge.eye.sender import CREDIT, Sender
@@ -168,6 +169,31 @@ def test_a_window_of_a_size_that_cannot_be_sent_is_reported_and_its_next_size_se
         eye.offer(picture(2))
         assert receiver.picture_index() == 2
         assert receiver.message(STATUS)[1] == b""
+
+
+def test_jpegs_about_the_limit_are_reported_once_for_a_size(receiver: Receiver, monkeypatch: pytest.MonkeyPatch):
+    said: list = []
+    limits = {0: wire.MOST_BODY, 1: 0}  # by the picture's index, even or odd
+
+    def offered(index: int, rows: int = 48) -> None:
+        before = eye.sent
+        monkeypatch.setattr(wire, "MOST_BODY", limits[index % 2])
+        eye.offer(picture(index, rows))
+        if index % 2:
+            wait_until(lambda: eye._next is None and eye._unsendable, 10.0, "the picture's refusal")
+        else:
+            assert receiver.picture_index() == index
+            receiver.reply(TAKEN, index)
+            assert eye.sent >= before
+
+    with start(receiver, said) as eye:
+        receiver.accept()
+        receiver.reply(WELCOME)
+        for index in range(8):
+            offered(index)
+        assert sum("JPEG" in line for line in said) == 1
+        offered(9, rows=64)
+        wait_until(lambda: sum("JPEG" in line for line in said) == 2, 10.0, "the reason of another size")
 
 
 def test_a_request_is_handed_over_once_and_answered_by_its_number(receiver: Receiver):
