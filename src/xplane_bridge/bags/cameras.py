@@ -17,7 +17,7 @@ class Camera(NamedTuple):
     """One camera's topics, by full name."""
 
     #: As `camera.launch` gave it: the name space below the bridge's; `FIRST` of the bridge's own. The whole name space,
-    #: of each camera, where two would be called alike.
+    #: of each camera, where two would be called alike; the whole topic where that takes none apart either.
     name: str
     frames: str  #: FrameState of each picture, at least one message
     info: str  #: CameraInfo, recorded or not
@@ -79,8 +79,10 @@ def has_jpegs(bags: Bags, camera: Camera) -> bool:
 
 def _names(short: Mapping[str, str], places: Mapping[str, str]) -> Mapping[str, str]:
     """Give the cameras' names, by topic: short ones, else whole places; files and labels take them apart by these."""
-    # No place has a hyphen: with it for the slash, a/b and a_b differ.
-    for named, slash in ((short, "_"), (places, "_"), (places, "-")):
+    # No topic has a hyphen: with it for the slash, a/b and a_b differ. Whole topics differ also where a camera in the
+    # root name space, whose place is empty, is beside one in the name space `FIRST`.
+    topics = {topic: topic for topic in places}
+    for named, slash in ((short, "_"), (places, "_"), (places, "-"), (topics, "-")):
         names = {topic: place.strip("/").replace("/", slash) or FIRST for topic, place in named.items()}
         if len(set(names.values())) == len(names):
             break

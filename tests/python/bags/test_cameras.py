@@ -75,6 +75,16 @@ def test_the_bridges_own_comes_first_and_each_has_its_own_topics(tmp_path: Path)
             "/z/flight_state",
             ["z", "z_a", "z_camera"],
         ),
+        (
+            ["/camera/frame_state", "/camera/camera/frame_state"],
+            "/flight_state",
+            ["camera-frame_state", "camera-camera-frame_state"],
+        ),
+        (
+            ["/camera/frame_state", "/camera/camera/frame_state"],
+            "",
+            ["camera-camera-frame_state", "camera-frame_state"],
+        ),
         ([], "/x/flight_state", []),
     ],
 )
