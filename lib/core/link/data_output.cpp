@@ -48,8 +48,7 @@ DataOutput::DataOutput(DataOutputOptions options, double read_timeout_s, Service
       services_(std::move(services)),
       quiet_ns_(toNanoseconds(std::max(kQuiet, kQuietPeriods / static_cast<double>(options_.rate_hz)))) {}
 
-void DataOutput::linkUp(std::shared_ptr<Journal> journal, const Endpoint& target, std::int64_t now_ns) {
-  journal_ = std::move(journal);
+void DataOutput::linkUp(const Endpoint& target, std::int64_t now_ns) {
   target_ = target;
   ++generation_;
   ever_heard_ = false;

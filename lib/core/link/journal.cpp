@@ -5,28 +5,22 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cerrno>
-#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
+#include <iterator>
 #include <sstream>
-#include <stdexcept>
+#include <tuple>
 #include <utility>
 
-#include "xplane_bridge/core/base/whole_number.hpp"
+#include "journal_format.hpp"
 
 namespace xplane_bridge::core {
 namespace {
 
-using nlohmann::json;
 namespace fs = std::filesystem;
-
-constexpr const char* kFormat = "xplane_bridge journal";
-constexpr int kVersion = 1;
 
 [[noreturn]] void fail(const std::string& path, const std::string& what) {
   throw JournalError("journal " + path + ": " + what);
@@ -86,110 +80,6 @@ class Lock {
   FileDescriptor file_;
 };
 
-/// JSON has no other numbers: with null in the place of one the whole file could not be read any more.
-void requireFinite(const std::string& what, float value) {
-  if (!std::isfinite(value)) {
-    throw JournalError("the journal cannot hold " + std::to_string(value) + " as what " + what +
-                       " is to be put back to: expected a finite number");
-  }
-}
-
-json toJson(const UndoOperation& operation) {
-  struct Writer {
-    json operator()(const UndoDref& dref) const {
-      requireFinite(dref.path, dref.value);
-      json out = {{"op", "dref"}, {"path", dref.path}, {"value", dref.value}};
-      if (!dref.confirm) {
-        out["confirm"] = false;
-      }
-      return out;
-    }
-    json operator()(const UndoData& data) const {
-      for (const float value : data.row.values) {
-        requireFinite("row " + std::to_string(data.row.index), value);
-      }
-      return {{"op", "data"}, {"row", data.row.index}, {"values", data.row.values}};
-    }
-    json operator()(const UndoUsel& usel) const { return {{"op", "usel"}, {"rows", usel.rows}}; }
-    json operator()(const UndoIse4& ise4) const {
-      return {{"op", "ise4_off"}, {"target", ise4.target}, {"address", ise4.address}, {"port", ise4.port}};
-    }
-    json operator()(const UndoPause&) const { return {{"op", "resume"}}; }
-  };
-  return std::visit(Writer{}, operation);
-}
-
-UndoOperation operationFrom(const json& document) {
-  const std::string op = document.at("op");
-  if (op == "dref") {
-    return UndoDref{document.at("path"), document.at("value"), document.value("confirm", true)};
-  }
-  if (op == "data") {
-    return UndoData{DataRow{wholeNumber<std::int32_t>(document.at("row")), document.at("values")}};
-  }
-  if (op == "usel") {
-    UndoUsel usel;
-    for (const json& row : document.at("rows")) {
-      usel.rows.push_back(wholeNumber<std::int32_t>(row));
-    }
-    return usel;
-  }
-  if (op == "ise4_off") {
-    return UndoIse4{wholeNumber<std::int32_t>(document.at("target")), document.at("address"),
-                    wholeNumber<std::uint16_t>(document.at("port"))};
-  }
-  if (op == "resume") {
-    return UndoPause{};
-  }
-  throw JournalError("unknown operation '" + op + "'");
-}
-
-json toJson(const JournalEntry& entry) {
-  json undo = json::array();
-  for (const UndoOperation& operation : entry.undo) {
-    undo.push_back(toJson(operation));
-  }
-  json document = {{"id", entry.id},
-                   {"purpose", entry.purpose},
-                   {"owner",
-                    {{"node", entry.owner.node},
-                     {"pid", entry.owner.pid},
-                     {"start_ticks", entry.owner.start_ticks},
-                     {"boot_id", entry.owner.boot_id},
-                     {"computer", entry.owner.computer}}},
-                   {"undo", undo}};
-  if (!entry.left.empty()) {
-    document["left"] = entry.left;
-  }
-  for (const JournalSubscription& subscription : entry.subscriptions) {
-    document["subscriptions"].push_back(
-        {{"port", subscription.port}, {"datarefs", subscription.datarefs}, {"rpos", subscription.rpos}});
-  }
-  return document;
-}
-
-JournalEntry entryFrom(const json& document) {
-  JournalEntry entry;
-  entry.id = document.at("id");
-  entry.purpose = document.at("purpose");
-  const json& owner = document.at("owner");
-  entry.owner.node = owner.at("node");
-  entry.owner.pid = wholeNumber<std::int64_t>(owner.at("pid"));
-  entry.owner.start_ticks = wholeNumber<std::int64_t>(owner.at("start_ticks"));
-  entry.owner.boot_id = owner.at("boot_id");
-  entry.owner.computer = owner.at("computer");
-  for (const json& operation : document.at("undo")) {
-    entry.undo.push_back(operationFrom(operation));
-  }
-  entry.left = document.value("left", "");
-  for (const json& subscription : document.value("subscriptions", json::array())) {
-    entry.subscriptions.push_back({wholeNumber<std::uint16_t>(subscription.at("port")),
-                                   subscription.at("datarefs").get<std::vector<std::string>>(),
-                                   subscription.at("rpos")});
-  }
-  return entry;
-}
-
 /// Moves a file that cannot be understood out of the way. With the lock held.
 [[noreturn]] void setAside(const std::string& path, const std::string& why) {
   std::string aside;
@@ -207,13 +97,7 @@ JournalEntry entryFrom(const json& document) {
                               ". What it held was not undone in X-Plane: look there, or restart X-Plane"));
 }
 
-/// What a file holds, or why it cannot be understood.
-struct Content {
-  std::vector<JournalEntry> entries;
-  std::string damage;
-};
-
-Content look(const std::string& path) {
+JournalContent look(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) {
     if (errno == ENOENT) {
@@ -226,29 +110,10 @@ Content look(const std::string& path) {
   if (file.bad()) {
     fail(path, "cannot be read");
   }
-  int version = 0;
-  Content content;
-  try {
-    const json document = json::parse(text.str());
-    if (document.at("format") != kFormat) {
-      content.damage = "format is not '" + std::string(kFormat) + "'";
-    } else {
-      version = wholeNumber<int>(document.at("version"));
-    }
-    if (version == kVersion) {
-      for (const json& entry : document.at("entries")) {
-        content.entries.push_back(entryFrom(entry));
-      }
-    }
-  } catch (const json::exception& error) {
-    content.damage = error.what();
-  } catch (const JournalError& error) {
-    content.damage = error.what();
-  } catch (const std::out_of_range& error) {
-    content.damage = error.what();
-  }
-  if (content.damage.empty() && version != kVersion) {
-    fail(path, "has version " + std::to_string(version) + ", this program knows version " + std::to_string(kVersion) +
+  JournalContent content = parseJournal(text.str());
+  if (content.damage.empty() && content.version != kJournalVersion) {
+    fail(path, "has version " + std::to_string(content.version) + ", this program knows version " +
+                   std::to_string(kJournalVersion) +
                    " only: use the xplane_bridge that wrote it to undo its entries, or delete it");
   }
   return content;
@@ -256,7 +121,7 @@ Content look(const std::string& path) {
 
 /// With the lock held.
 std::vector<JournalEntry> read(const std::string& path) {
-  Content content = look(path);
+  JournalContent content = look(path);
   if (!content.damage.empty()) {
     setAside(path, content.damage);
   }
@@ -293,17 +158,14 @@ void write(const std::string& path, const std::vector<JournalEntry>& entries) {
     syncFolder(path);
     return;
   }
-  json document = {{"format", kFormat}, {"version", kVersion}, {"entries", json::array()}};
-  for (const JournalEntry& entry : entries) {
-    document["entries"].push_back(toJson(entry));
-  }
+  const std::string text = toText(entries);
   const std::string temporary = path + ".new";
   {
     const FileDescriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
     if (file.get() < 0) {
       failErrno(temporary, "cannot be opened");
     }
-    writeAll(file.get(), document.dump(2) + "\n", temporary);
+    writeAll(file.get(), text, temporary);
     if (fsync(file.get()) != 0) {
       failErrno(temporary, "cannot be synchronised");
     }
@@ -312,6 +174,58 @@ void write(const std::string& path, const std::vector<JournalEntry>& entries) {
     failErrno(path, "cannot be replaced");
   }
   syncFolder(path);
+}
+
+/// Whether both put back the same thing, if perhaps to another value.
+bool isSameChange(const UndoOperation& a, const UndoOperation& b) {
+  if (a.index() != b.index()) {
+    return false;
+  }
+  if (const auto* dref = std::get_if<UndoDref>(&a)) {
+    return dref->path == std::get<UndoDref>(b).path;
+  }
+  if (const auto* data = std::get_if<UndoData>(&a)) {
+    return data->row.index == std::get<UndoData>(b).row.index;
+  }
+  if (const auto* ise4 = std::get_if<UndoIse4>(&a)) {
+    const auto& other = std::get<UndoIse4>(b);
+    return std::tie(ise4->target, ise4->address, ise4->port) == std::tie(other.target, other.address, other.port);
+  }
+  return true;  // the rows of Data Output are one set, and there is one pause
+}
+
+/// Adds what `from` undoes. What both put back gets the value of `from`, the earlier of the two: the user's own. It
+/// comes first, as an override is given back after what depends on it.
+void mergeUndo(const std::vector<UndoOperation>& from, std::vector<UndoOperation>* into) {
+  std::vector<UndoOperation> missing;
+  for (const UndoOperation& operation : from) {
+    const auto same = std::find_if(into->begin(), into->end(),
+                                   [&](const UndoOperation& each) { return isSameChange(each, operation); });
+    if (same == into->end()) {
+      missing.push_back(operation);
+    } else if (auto* usel = std::get_if<UndoUsel>(&*same)) {
+      const std::vector<std::int32_t> rows = usel->rows;
+      const std::vector<std::int32_t>& more = std::get<UndoUsel>(operation).rows;
+      std::copy_if(more.begin(), more.end(), std::back_inserter(usel->rows),
+                   [&rows](std::int32_t row) { return std::find(rows.begin(), rows.end(), row) == rows.end(); });
+    } else {
+      *same = operation;
+    }
+  }
+  into->insert(into->begin(), missing.begin(), missing.end());
+}
+
+/// Adds the ports of `from`; those of both have been noted there later, with all that was asked for.
+void mergeSubscriptions(const std::vector<JournalSubscription>& from, std::vector<JournalSubscription>* into) {
+  for (const JournalSubscription& subscription : from) {
+    const auto same = std::find_if(into->begin(), into->end(),
+                                   [&](const JournalSubscription& each) { return each.port == subscription.port; });
+    if (same == into->end()) {
+      into->push_back(subscription);
+    } else {
+      *same = subscription;
+    }
+  }
 }
 
 }  // namespace
@@ -344,14 +258,19 @@ Journal::Journal(std::string path, JournalOwner self, AliveFunction alive, bool 
   }
 }
 
-std::shared_ptr<Journal> Journal::ofSubscriptions() const {
-  const fs::path path(path_);
-  const fs::path beside = path.parent_path() / (path.stem().string() + "_subscriptions" + path.extension().string());
+std::shared_ptr<Journal> Journal::ofSubscriptions(const Endpoint& peer) const {
+  // Whichever loopback address is asked, X-Plane sees the same one asking.
+  const std::uint32_t address = isSameHost(peer.address, kLoopbackAddress) ? kLoopbackAddress : peer.address;
+  const fs::path named(
+      journalPath(fs::path(path_).parent_path().string(), Endpoint{address, 0}.addressString(), peer.port));
+  const fs::path beside = named.parent_path() / (named.stem().string() + "_subscriptions" + named.extension().string());
   return std::make_shared<Journal>(beside.string(), self_, alive_, waits_);
 }
 
+Journal Journal::withoutWaiting() const { return Journal(path_, self_, alive_, false); }
+
 std::vector<JournalEntry> Journal::entries() const {
-  Content content = look(path_);
+  JournalContent content = look(path_);
   if (content.damage.empty()) {
     return std::move(content.entries);
   }
@@ -458,6 +377,31 @@ void Journal::removeUndone(const std::vector<JournalEntry>& undone) {
   });
 }
 
+std::vector<JournalEntry> Journal::adopt(const std::vector<JournalEntry>& offered) {
+  const Lock lock(path_, waits_);
+  std::vector<JournalEntry> entries = read(path_);
+  std::vector<JournalEntry> adopted;
+  for (const JournalEntry& entry : offered) {
+    const auto same =
+        std::find_if(entries.begin(), entries.end(), [&](const JournalEntry& each) { return each.id == entry.id; });
+    if (same == entries.end()) {
+      entries.push_back(entry);
+    } else if (same->owner == entry.owner || (same->owner != self_ && !alive_(same->owner))) {
+      JournalEntry merged = entry;
+      mergeUndo(same->undo, &merged.undo);
+      mergeSubscriptions(same->subscriptions, &merged.subscriptions);
+      *same = std::move(merged);
+    } else {
+      continue;
+    }
+    adopted.push_back(entry);
+  }
+  if (!adopted.empty()) {
+    write(path_, entries);
+  }
+  return adopted;
+}
+
 void Journal::removeIf(const std::function<bool(const JournalEntry&)>& chosen) {
   const Lock lock(path_, waits_);
   std::vector<JournalEntry> entries = read(path_);
@@ -476,11 +420,41 @@ std::string journalPath(const std::string& folder, const std::string& host, std:
   return (fs::path(folder) / (name + "_" + std::to_string(port) + ".json")).string();
 }
 
-JournalFactory journalsIn(const std::string& folder, const std::string& node) {
-  return [folder, node](const Endpoint& peer) {
-    // One file whatever loopback address the X-Plane of this computer is called by.
-    const Endpoint named{isSameHost(peer.address, kLoopbackAddress) ? kLoopbackAddress : peer.address, peer.port};
-    return std::make_shared<Journal>(journalPath(folder, named.addressString(), named.port), thisProcess(node));
+JournalFactory journalsIn(const std::string& folder, const std::string& node, LogFunction log) {
+  const auto open = [folder, node](std::uint32_t address, std::uint16_t port) {
+    return std::make_shared<Journal>(journalPath(folder, Endpoint{address, port}.addressString(), port),
+                                     thisProcess(node));
+  };
+  return [open, log = std::move(log)](const Endpoint& peer) {
+    std::vector<std::uint32_t> own = {kLoopbackAddress};
+    try {
+      own = ownAddresses();
+    } catch (const SocketError& error) {
+      log(LogLevel::kError, "whether " + peer.addressString() +
+                                " is this computer is not known, and the journal is named after it: " + error.what());
+    }
+    if (std::none_of(own.begin(), own.end(), [&peer](std::uint32_t each) { return isSameHost(each, peer.address); })) {
+      return open(peer.address, peer.port);
+    }
+    const std::shared_ptr<Journal> journal = open(kLoopbackAddress, peer.port);
+    for (const std::uint32_t address : own) {
+      Journal earlier = open(address, peer.port)->withoutWaiting();
+      if (earlier.path() == journal->path()) {
+        continue;
+      }
+      try {
+        std::vector<JournalEntry> left = earlier.entries();
+        left.erase(std::remove_if(left.begin(), left.end(),
+                                  [&](const JournalEntry& entry) { return isAlive(entry.owner, earlier.path()); }),
+                   left.end());
+        if (!left.empty()) {
+          earlier.removeUndone(journal->withoutWaiting().adopt(left));
+        }
+      } catch (const JournalError& error) {
+        log(LogLevel::kError, error.what());
+      }
+    }
+    return journal;
   };
 }
 

@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::int64_t kResolveNs = 5 * kNanosecondsPerSecond;
 constexpr std::int64_t kJoinNs = 5 * kNanosecondsPerSecond;
+constexpr std::int64_t kMoveNs = kNanosecondsPerSecond / 5;
 constexpr std::int64_t kRposRetryNs = kNanosecondsPerSecond;
 
 /// Of this process: what an earlier one has left under the same name is kept until it is ended.
@@ -30,10 +31,17 @@ void SimLink::maintain(std::int64_t now_ns) {
       beacon_failure_ = std::string("X-Plane's beacon cannot be heard: ") + error.what();
     }
   }
+  // Before another peer is found: it has not refused anything.
+  if (const std::uint64_t refused = control_source_->counters().refused; std::exchange(refused_, refused) != refused) {
+    refused_ns_ = now_ns;
+  }
   if (stop_phase_ == StopPhase::kRunning) {
     findPeer(now_ns);
   }
   refreshLink(now_ns);
+  if (left_journal_ != nullptr && now_ns >= next_move_ns_) {
+    moveEntries();
+  }
   if (peer_.valid() && !monitor_.alive() && now_ns >= next_probe_ns_) {
     next_probe_ns_ = now_ns + jitter_.around(toNanoseconds(options_.probe_period_s));
     status_subscription_.restart(now_ns);
@@ -124,10 +132,64 @@ void SimLink::setPeer(const Endpoint& peer, const std::string& why) {
     monitor_.beaconHeard(beacons_.lastHeard(peer));
   }
   next_probe_ns_ = now_ns_;
-  std::shared_ptr<Journal> journal = journals_ ? journals_(peer) : nullptr;
-  subscriptions_journal_ = journal && options_.journal_subscriptions ? journal->ofSubscriptions() : nullptr;
-  const std::lock_guard<std::mutex> lock(mutex_);
-  journal_ = std::move(journal);
+  refused_ns_.reset();
+  openJournals();
+}
+
+/// X-Plane has another address, or was restarted at another port: what this process has noted goes along, as if that
+/// were the old one. What belongs to the run before is dropped by what noted it, as after a restart at the old port.
+void SimLink::openJournals() {
+  left_journal_ = journal();
+  left_subscriptions_journal_ = subscriptions_journal_;
+  std::shared_ptr<Journal> opened = journals_ ? journals_(peer_) : nullptr;
+  subscriptions_journal_ = opened && options_.journal_subscriptions ? opened->ofSubscriptions(peer_) : nullptr;
+  data_output_.setJournal(opened);
+  // In the new one before another thread looks there, and out of the old one afterwards.
+  copyEntries(left_journal_.get(), opened.get(), false);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    journal_ = opened;
+  }
+  moveEntries();
+}
+
+/// Again until X-Plane answers: another process may have had a journal locked, and another thread of this one may have
+/// noted something in the old one while the new one was opened.
+void SimLink::moveEntries() {
+  next_move_ns_ = now_ns_ + kMoveNs;
+  const bool moved = copyEntries(left_journal_.get(), journal().get(), true);
+  const bool subscriptions_moved = copyEntries(left_subscriptions_journal_.get(), subscriptions_journal_.get(), true);
+  if (moved && subscriptions_moved) {
+    move_failure_.clear();
+    if (monitor_.alive()) {
+      left_journal_.reset();
+      left_subscriptions_journal_.reset();
+    }
+  }
+}
+
+/// @return whether nothing is left to be copied
+bool SimLink::copyEntries(const Journal* from, const Journal* to, bool remove) {
+  if (from == nullptr || to == nullptr || from->path() == to->path()) {
+    return true;
+  }
+  try {
+    const std::vector<JournalEntry> own = from->own();
+    if (own.empty()) {
+      return true;
+    }
+    // The link must not stand still for a process that was stopped while it had a journal locked.
+    const std::vector<JournalEntry> adopted = to->withoutWaiting().adopt(own);
+    if (remove) {
+      from->withoutWaiting().removeUndone(adopted);
+    }
+    return adopted.size() == own.size();
+  } catch (const JournalError& error) {
+    if (std::exchange(move_failure_, error.what()) != error.what()) {
+      log_(LogLevel::kError, move_failure_);
+    }
+    return false;
+  }
 }
 
 void SimLink::refreshLink(std::int64_t now_ns) {
@@ -151,6 +213,8 @@ void SimLink::refreshLink(std::int64_t now_ns) {
     seen_epoch_ = monitor_.epoch();
     came_up_ns_ = now_ns;
     answered_ns_.reset();
+    resolve_failure_.clear();  // it is where it was found last
+    moveEntries();
     if (stop_phase_ == StopPhase::kRunning) {
       leftovers_.linkUp(subscriptions_journal_, now_ns);
       subscriptions_changed_ = true;
@@ -180,7 +244,7 @@ void SimLink::updateDataOutput(std::int64_t now_ns) {
     log_(LogLevel::kError, std::string("Data Output has no target: ") + error.what());
     return;
   }
-  data_output_.linkUp(journal(), target, now_ns);
+  data_output_.linkUp(target, now_ns);
 }
 
 void SimLink::updateRpos(std::int64_t now_ns) {

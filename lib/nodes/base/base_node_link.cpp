@@ -62,7 +62,7 @@ void BaseNode::makeLink() {
     hub = std::move(frames);
   }
   link_ = std::make_unique<core::SimLink>(options, linkCallbacks(), clock_, logToRos,
-                                          core::journalsIn(userFolder(), name()), std::move(hub));
+                                          core::journalsIn(userFolder(), name(), logToRos), std::move(hub));
   addDiagnostics("link to X-Plane", [this, last = core::LinkCounters()](auto& status) mutable {
     const core::LinkCounters now = link_->counters();
     fillLinkDiagnostics(link_->status(), now, last, link_->unansweredDatarefs(), &status);

@@ -43,6 +43,7 @@ class ScriptedHub : public DatagramHub {
     std::vector<Sent> sent;
     bool refuses = false;       // to send
     std::uint64_t dropped = 0;  // as the kernel counts it, of each source
+    std::uint64_t refused = 0;  // the same of "port unreachable"
     std::vector<std::string> opened, ignored;
     std::vector<std::string> awaited;  // of waitFor()
     std::string listened_to;           // by fdFor(); empty: by none, "any"
@@ -127,6 +128,7 @@ class ScriptedHub : public DatagramHub {
     UdpCounters counters() const override {
       UdpCounters out = counts;
       out.dropped = wire->dropped;
+      out.refused = wire->refused;
       return out;
     }
 

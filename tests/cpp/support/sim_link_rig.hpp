@@ -71,9 +71,8 @@ class SimLinkRig : public testing::Test {
         states_.push_back(status.state);
       }
     };
-    link_ = std::make_unique<SimLink>(
-        options, std::move(callbacks), clock(), [this](LogLevel, const std::string& line) { log_.push_back(line); },
-        journalsIn(folder_, "/test"));
+    const LogFunction log = [this](LogLevel, const std::string& line) { log_.push_back(line); };
+    link_ = std::make_unique<SimLink>(options, std::move(callbacks), clock(), log, journalsIn(folder_, "/test", log));
   }
 
   /// Subscribes a group whose datagrams are counted, and values kept, under the number returned.

@@ -117,11 +117,34 @@ def test_who_calls_the_same_x_plane_by_another_address_holds_it(tmp_path, monkey
     assert Journal(tmp_path, address, 49000, also=also).holders() == ([said] if is_held else [])
 
 
+def test_an_x_plane_of_this_computer_has_one_file_as_the_nodes_name_it(tmp_path, monkeypatch):
+    own = ("127.", "198.51.100.")
+    monkeypatch.setattr("xplane_bridge.doctor.observe.computer.is_own", lambda address: address.startswith(own))
+    addresses = ("127.0.0.1", "127.0.0.2", "198.51.100.7", "192.0.2.1")
+    names = [Journal(tmp_path, address, 49000).file.name for address in addresses]
+    assert names == [*["127.0.0.1_49000.json"] * 3, "192.0.2.1_49000.json"]
+
+
 def test_a_journal_of_another_address_that_cannot_be_understood_is_said(notes):
     file = notes.file.with_name("127.0.0.2_49000.json")
     file.write_text("{", "utf-8")
     with pytest.raises(JournalError, match=rf"^{file} cannot be understood"):
         notes.holders()
+
+
+def test_what_was_left_under_another_address_is_undone_and_taken_out_of_its_file(tmp_path):
+    id_ = f"override:{STICK}"
+    with FakeXPlane({STICK: 1.0}) as xplane:
+        notes = Journal(tmp_path, "127.0.0.1", xplane.port)
+        notes.record(id_, journal.OVERRIDE, [write_dataref(STICK, 0.0)])
+        earlier = tmp_path / f"127.0.0.2_{xplane.port}.json"
+        write(earlier, entry(id_, 0, write_dataref(STICK, 0.0)), entry("override:x", os.getppid()))
+        to = link.XPlane("127.0.0.1", xplane.port, notes)
+        assert to.undo(notes.orphans()) == []
+        to.close()
+        assert written(xplane) == [(STICK, 0.0)]
+    assert [each["id"] for each in journal.load(earlier)] == ["override:x"]
+    assert [each["id"] for each in notes.own()] == [id_]
 
 
 def unconfirmed(path, value):

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "xplane_bridge/core/base/log.hpp"
@@ -51,8 +52,10 @@ class DataOutput {
 
   DataOutput(DataOutputOptions options, double read_timeout_s, Services services);
 
+  /// Of the X-Plane that the link has chosen.
+  void setJournal(std::shared_ptr<Journal> journal) { journal_ = std::move(journal); }
   /// The link came up anew: `target` is where X-Plane shall send to.
-  void linkUp(std::shared_ptr<Journal> journal, const Endpoint& target, std::int64_t now_ns);
+  void linkUp(const Endpoint& target, std::int64_t now_ns);
   /// Valid DATA has arrived.
   void heard(const DataView& data, std::int64_t now_ns);
   /// Call regularly. `flowing`: X-Plane answers and is not paused, so DATA should arrive.

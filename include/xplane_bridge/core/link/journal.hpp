@@ -12,6 +12,7 @@
 #include <variant>
 #include <vector>
 
+#include "xplane_bridge/core/base/log.hpp"
 #include "xplane_bridge/core/link/journal_owner.hpp"
 #include "xplane_bridge/core/wire/packets.hpp"
 #include "xplane_bridge/core/wire/udp_socket.hpp"
@@ -107,9 +108,12 @@ class Journal {
   const std::string& path() const { return path_; }
   const JournalOwner& self() const { return self_; }
 
-  /// The journal of subscriptions beside this one, "<file>_subscriptions.json": a process that gives overrides back
-  /// never has to wait for a node that is writing down hundreds of datarefs, or was stopped in the middle of that.
-  std::shared_ptr<Journal> ofSubscriptions() const;
+  /// The journal of subscriptions beside this one, "<host>_<port>_subscriptions.json": a process that gives overrides
+  /// back never has to wait for a node that is writing down hundreds of datarefs, or was stopped in the middle of that.
+  /// By the address that X-Plane is asked at, `peer`: it ends them for the address that asks, which depends on that.
+  std::shared_ptr<Journal> ofSubscriptions(const Endpoint& peer) const;
+  /// The same journal for who must not wait for the lock.
+  Journal withoutWaiting() const;
 
   /// Everything in the file; empty when there is none.
   std::vector<JournalEntry> entries() const;
@@ -135,6 +139,11 @@ class Journal {
   void remove(const std::vector<std::string>& ids);
   /// Removes what was found by orphans() and has been undone, but not what record() has taken over since.
   void removeUndone(const std::vector<JournalEntry>& undone);
+  /// Adds entries of the same X-Plane from another file, under their owners, and returns those; there they are to be
+  /// removed afterwards (removeUndone()), so that a crash loses none. With one of the same id here, of the same owner
+  /// or of one that is gone, an entry is merged, and the values here are put back; that of another process that runs
+  /// stays as it is, and the entry is not taken.
+  std::vector<JournalEntry> adopt(const std::vector<JournalEntry>& offered);
 
  private:
   void removeIf(const std::function<bool(const JournalEntry&)>& chosen);
@@ -151,8 +160,10 @@ std::string journalPath(const std::string& folder, const std::string& host, std:
 
 /// Opens the journal of the X-Plane at `peer`, once that is known.
 using JournalFactory = std::function<std::shared_ptr<Journal>(const Endpoint& peer)>;
-/// Journals in `folder` (by convention ~/.ros/xplane_bridge) in the name of this process as `node`.
-JournalFactory journalsIn(const std::string& folder, const std::string& node);
+/// Journals in `folder` (by convention ~/.ros/xplane_bridge) in the name of this process as `node`. An X-Plane of this
+/// computer has one, whichever of its addresses it is called by. Where earlier versions have left entries under another
+/// one, and their processes are gone, they are taken over; `log` says where that fails.
+JournalFactory journalsIn(const std::string& folder, const std::string& node, LogFunction log);
 
 /// This process's entry of that id; nullopt: there is none, or the guardian, scripts/release_overrides or the loss of
 /// its X-Plane has ended it, so that nothing of it is to be undone any more. Throws JournalError.

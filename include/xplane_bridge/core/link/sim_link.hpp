@@ -195,6 +195,9 @@ class SimLink : public SimulatorPort {
   void findPeer(std::int64_t now_ns);
   void resolve(std::int64_t now_ns);
   void setPeer(const Endpoint& peer, const std::string& why);
+  void openJournals();
+  void moveEntries();
+  bool copyEntries(const Journal* from, const Journal* to, bool remove);
   void refreshLink(std::int64_t now_ns);
   void restartSubscriptions(std::int64_t now_ns);
   void updateDataOutput(std::int64_t now_ns);
@@ -276,6 +279,8 @@ class SimLink : public SimulatorPort {
   std::optional<Sighting> other_address_;    // X-Plane's messages from another computer, or another address of its
   std::optional<std::int64_t> answered_ns_;  // RREF, the last one
   std::int64_t came_up_ns_ = 0;
+  std::uint64_t refused_ = 0;               // control_source_'s counter of "port unreachable", as of refused_ns_
+  std::optional<std::int64_t> refused_ns_;  // the last one of this peer
 
   LinkMonitor monitor_;
   BeaconTracker beacons_;
@@ -286,8 +291,12 @@ class SimLink : public SimulatorPort {
   DataOutput data_output_;
   LeftoverSubscriptions leftovers_;
   std::shared_ptr<Journal> subscriptions_journal_;  // null: they are not written down
-  bool subscriptions_changed_ = false;              // since recordSubscriptions()
-  std::vector<Group> groups_;                       // by falling priority
+  // Of the peer before, until this one has answered and all entries have been moved.
+  std::shared_ptr<Journal> left_journal_, left_subscriptions_journal_;
+  std::string move_failure_;
+  std::int64_t next_move_ns_ = 0;
+  bool subscriptions_changed_ = false;  // since recordSubscriptions()
+  std::vector<Group> groups_;           // by falling priority
   std::deque<End> ends_;
   std::deque<End> ends_again_;  // as ends_, after all else, while the node runs: one may be lost, and none is confirmed
   std::deque<End> ended_in_silence_;  // for when X-Plane answers again

@@ -9,7 +9,7 @@ import os
 import socket
 import time
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence
+from typing import Any, Callable, Dict, Iterator, List, Sequence
 
 from xplane_bridge import protocol
 from xplane_bridge.doctor.observe.computer import is_same_computer
@@ -86,8 +86,8 @@ class Journal:
     def __init__(
         self, folder: Path, address: str, port: int, proc: Path = Path("/proc"), also: Sequence[str] = ()
     ) -> None:
-        # As the nodes name it: one file whatever loopback address the X-Plane of this computer is called by.
-        name = "127.0.0.1" if address.startswith("127.") else address
+        # As the nodes name it: one file whichever of its addresses the X-Plane of this computer is called by.
+        name = "127.0.0.1" if is_same_computer(address, "127.0.0.1") else address
         self.file = folder / f"{name}_{port}.json"
         self._proc, self._port, self._addresses = proc, port, (address, *also)
         try:
@@ -113,16 +113,20 @@ class Journal:
         ]
 
     def orphans(self) -> List[Entry]:
-        """What processes that are gone have left: to be undone, then removed. Without what only nodes can undo."""
+        """What processes that are gone have left: to be undone, then removed. Without what only nodes can undo.
+
+        Earlier versions have noted it under the address that they called an X-Plane of this computer by.
+        """
         return [
             entry
-            for entry in self._load()
+            for file in (*self._others(), self.file)
+            for entry in self._load(file)
             if self._is_gone(entry) and all(operation["op"] in _OPERATIONS for operation in entry["undo"])
         ]
 
     def own(self) -> List[Entry]:
         """What this process has noted, in the order in which it did."""
-        return [entry for entry in self._load() if self._is_own(entry)]
+        return [entry for entry in self._load(self.file) if self._is_own(entry)]
 
     def record(self, id_: str, purpose: str, undo: Sequence[Operation]) -> None:
         """Notes how to undo a change; only when this returns may it be made. The first note of an id counts."""
@@ -138,11 +142,13 @@ class Journal:
             kept = [entry for entry in entries if entry["id"] != id_]
             return [*kept, {"id": id_, "purpose": purpose, "owner": self._self, "undo": list(undo)}]
 
-        self._change(add)
+        self._change(self.file, add)
 
-    def remove(self, ids: Sequence[str]) -> None:
-        """Takes entries out that are undone."""
-        self._change(lambda entries: [entry for entry in entries if entry["id"] not in ids])
+    def remove(self, undone: Sequence[Entry]) -> None:
+        """Takes entries out that are undone, of own() or orphans(); one that has been noted anew since stays."""
+        for file in (self.file, *self._others()):
+            if any(entry in undone for entry in self._load(file)):
+                self._change(file, lambda entries: [entry for entry in entries if entry not in undone])
 
     def _others(self) -> List[Path]:
         """The journals of those who call the same X-Plane by another address."""
@@ -160,17 +166,17 @@ class Journal:
     def _is_gone(self, entry: Entry) -> bool:
         return judge_owner(entry["owner"], self.file.parent, self._proc) is Owner.GONE
 
-    def _change(self, how: Callable[[List[Entry]], List[Entry]]) -> None:
-        with self._locked():
-            before = self._load()
+    def _change(self, file: Path, how: Callable[[List[Entry]], List[Entry]]) -> None:
+        with self._locked(file):
+            before = self._load(file)
             after = how(before)
             if after != before:
-                self._store(after)
+                self._store(file, after)
 
     @contextlib.contextmanager
-    def _locked(self) -> Iterator[None]:
-        self.file.parent.mkdir(parents=True, exist_ok=True)
-        with open(f"{self.file}.lock", "a", encoding="utf-8") as lock:
+    def _locked(self, file: Path) -> Iterator[None]:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with open(f"{file}.lock", "a", encoding="utf-8") as lock:
             deadline = time.monotonic() + _LOCK_TIMEOUT_S
             while True:
                 try:
@@ -178,14 +184,14 @@ class Journal:
                     break
                 except BlockingIOError:
                     if time.monotonic() > deadline:
-                        msg = f"{self.file}: another process has it locked: it was stopped while it wrote; end it first"
+                        msg = f"{file}: another process has it locked: it was stopped while it wrote; end it first"
                         raise JournalError(msg) from None
                     time.sleep(0.02)
             yield
 
-    def _load(self, file: Optional[Path] = None) -> List[Entry]:
+    @staticmethod
+    def _load(file: Path) -> List[Entry]:
         """Also without the lock, which a hung node may have: the file is replaced as a whole."""
-        file = file or self.file
         try:
             return load(file)
         except FileNotFoundError:
@@ -194,21 +200,22 @@ class Journal:
             msg = f"{file} cannot be understood ({error}): move it away, or restart X-Plane and delete it"
             raise JournalError(msg) from None
 
-    def _store(self, entries: List[Entry]) -> None:
+    @staticmethod
+    def _store(file: Path, entries: List[Entry]) -> None:
         if entries:
-            new = Path(f"{self.file}.new")
+            new = Path(f"{file}.new")
             try:
                 text = json.dumps({**HEAD, "entries": entries}, indent=2, allow_nan=False)
             except ValueError:
-                msg = f"{self.file}: a value that is no number cannot be noted, so it could not be put back"
+                msg = f"{file}: a value that is no number cannot be noted, so it could not be put back"
                 raise JournalError(msg) from None
-            with new.open("w", encoding="utf-8") as file:
-                file.write(text)
-                file.flush()
-                os.fsync(file.fileno())
-            new.rename(self.file)
+            with new.open("w", encoding="utf-8") as out:
+                out.write(text)
+                out.flush()
+                os.fsync(out.fileno())
+            new.rename(file)
         else:
-            self.file.unlink()
-        folder = os.open(self.file.parent, os.O_RDONLY)
+            file.unlink()
+        folder = os.open(file.parent, os.O_RDONLY)
         os.fsync(folder)
         os.close(folder)

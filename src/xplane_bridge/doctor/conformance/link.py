@@ -257,7 +257,7 @@ class XPlane:
             What X-Plane does not show, in words.
         """
         left = []
-        again: Dict[str, List[Operation]] = {}
+        again: List[Tuple[Dict[str, Any], List[Operation]]] = []
         for entry in reversed(entries):
             operations, wanted = entry["undo"], _confirmed(entry["undo"])
             unconfirmed = [each for each in operations if each["op"] == "dref" and not _is_confirmed(each)]
@@ -267,14 +267,14 @@ class XPlane:
             if not self._carry_out(operations):
                 left.append(entry["id"])
             elif unconfirmed and not wanted:  # levers are not sent again: they are the pilot's after the release
-                again[entry["id"]] = unconfirmed
+                again.append((entry, unconfirmed))
             else:
-                self.journal.remove([entry["id"]])
+                self.journal.remove([entry])
         if again:
             time.sleep(_UNCONFIRMED_AGAIN_S)
-            for operations in again.values():
+            for _, operations in again:
                 self._send_all(operations)
-            self.journal.remove(list(again))
+            self.journal.remove([entry for entry, _ in again])
         return left
 
     def _carry_out(self, operations: Sequence[Operation]) -> bool:

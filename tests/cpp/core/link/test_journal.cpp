@@ -1,6 +1,8 @@
 #include "xplane_bridge/core/link/journal.hpp"
 
+#include <dlfcn.h>
 #include <gtest/gtest.h>
+#include <ifaddrs.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -10,12 +12,22 @@
 #include <fstream>
 #include <future>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "journal_file.hpp"
+
+static bool lists_addresses = true;  // whether the system does
+
+/// In place of the system's.
+extern "C" int getifaddrs(ifaddrs** list) {
+  static const auto of_system = reinterpret_cast<decltype(&getifaddrs)>(dlsym(RTLD_NEXT, "getifaddrs"));
+  return lists_addresses ? of_system(list) : -1;
+}
 
 namespace xplane_bridge::core {
 namespace {
@@ -364,11 +376,109 @@ TEST(JournalPath, HoldsOnlyFileCharacters) {
   EXPECT_EQ(journalPath("/f", "../sim pc", 1), "/f/..-sim-pc_1.json");
 }
 
-TEST(JournalsIn, NamesTheFileAfterThePeer) {
-  const JournalFactory journals = journalsIn("/f", "/node");
-  EXPECT_EQ(journals({0xC0A80105U, 49000})->path(), "/f/192.168.1.5_49000.json");
-  EXPECT_EQ(journals({0x7F000101U, 49000})->path(), "/f/127.0.0.1_49000.json");
-  EXPECT_EQ(journals({0x7F000101U, 49000})->self().node, "/node");
+TEST_F(JournalTest, AnAdoptedEntryIsMergedUnlessAnotherProcessThatRunsHoldsIt) {
+  const JournalOwner running{"/runs", 1, 2, "boot", "pc"};
+  journal().record("own", "override", {UndoDref{"fov", 1.0F}});
+  Journal(path_, deadOwner()).record("gone", "data_output", {UndoUsel{{3}}, UndoDref{"rate", 20.0F}});
+  Journal(path_, running).record("held", "override", {UndoDref{"fov", 1.0F}});
+  Journal from(folder_ + "/10.0.0.2_49000.json", thisProcess("/rx"));
+  from.record({{"own", "override", {UndoDref{"lever", 0.5F}, UndoDref{"fov", 9.0F}}},
+               {"gone", "data_output", {UndoUsel{{3, 5}}, UndoDref{"rate", 99.0F}, UndoIse4{64, "1.2.3.4", 5}}},
+               {"held", "override", {UndoDref{"lever", 0.5F}}},
+               {"new", "override", {UndoPause{}}}});
+  from.removeUndone(journal().adopt(from.own()));
+  ASSERT_EQ(from.entries().size(), 1U);
+  EXPECT_EQ(from.entries()[0].id, "held") << "it has not been taken";
+  std::map<std::string, nlohmann::json> found;
+  const nlohmann::json document = readFile();
+  for (const nlohmann::json& entry : document.at("entries")) found[entry.at("id")] = entry.at("undo");
+  const nlohmann::json expected = nlohmann::json::parse(R"({
+    "own": [{"op": "dref", "path": "lever", "value": 0.5}, {"op": "dref", "path": "fov", "value": 1.0}],
+    "gone": [{"op": "usel", "rows": [3, 5]}, {"op": "dref", "path": "rate", "value": 20.0},
+             {"op": "ise4_off", "target": 64, "address": "1.2.3.4", "port": 5}],
+    "held": [{"op": "dref", "path": "fov", "value": 1.0}],
+    "new": [{"op": "resume"}]})");
+  EXPECT_EQ(nlohmann::json(found), expected);
+  EXPECT_EQ(journal().own().size(), 3U);
+}
+
+class JournalsIn : public JournalTest {
+ protected:
+  std::string fileOf(std::uint32_t address) {
+    return fs::path(journals_({address, 49000})->path()).filename().string();
+  }
+  /// Another of this computer's addresses than the loopback's; 0: it has none.
+  static std::uint32_t otherAddress() {
+    for (const std::uint32_t address : ownAddresses()) {
+      if (!isSameHost(address, kLoopbackAddress)) return address;
+    }
+    return 0;
+  }
+
+  std::vector<std::string> log_;
+  JournalFactory journals_ =
+      journalsIn(folder_, "/node", [this](LogLevel, const std::string& text) { log_.push_back(text); });
+};
+
+TEST_F(JournalsIn, NamesTheFileAfterThePeer) {
+  EXPECT_EQ(fileOf(0xC0A80105U), "192.168.1.5_49000.json");
+  const Endpoint peer{0xC0A80105U, 49000};
+  EXPECT_EQ(journals_(peer)->self().node, "/node");
+}
+
+TEST_F(JournalsIn, AnXPlaneOfThisComputerHasOneFileWhicheverAddressItIsCalledBy) {
+  EXPECT_EQ(fileOf(0x7F000101U), "127.0.0.1_49000.json");
+  for (const std::uint32_t address : ownAddresses()) EXPECT_EQ(fileOf(address), "127.0.0.1_49000.json");
+}
+
+TEST_F(JournalsIn, SubscriptionsAreOfTheAddressThatIsAsked) {
+  const auto file = [this](std::uint32_t address) {
+    const Endpoint peer{address, 49000};
+    return fs::path(journals_(peer)->ofSubscriptions(peer)->path()).filename().string();
+  };
+  EXPECT_EQ(file(0x7F000101U), "127.0.0.1_49000_subscriptions.json");
+  if (const std::uint32_t other = otherAddress(); other != 0) {
+    const std::string named = Endpoint{other, 0}.addressString();
+    EXPECT_EQ(file(other), named + "_49000_subscriptions.json");
+  }
+}
+
+TEST_F(JournalsIn, TakesOverWhatAnEarlierVersionHasLeftUnderAnotherAddress) {
+  const std::uint32_t other = otherAddress();
+  if (other == 0) GTEST_SKIP() << "this computer has no address but the loopback's";
+  const std::string earlier = journalPath(folder_, Endpoint{other, 0}.addressString(), 49000);
+  Journal(earlier, deadOwner()).record("left", "override", kReleaseJoystick);
+  Journal(earlier, thisProcess("/runs")).record("runs", "override", kReleaseJoystick);
+  Journal(earlier, deadOwner()).record("held", "override", kReleaseJoystick);
+  const std::string now = journalPath(folder_, "127.0.0.1", 49000);
+  Journal(now, thisProcess("/runs")).record("held", "override", kReleaseJoystick);
+  {
+    const HeldLock held(now);
+    journals_({kLoopbackAddress, 49000});
+    ASSERT_EQ(log_.size(), 1U);
+    EXPECT_NE(log_[0].find("another process has it locked"), std::string::npos) << log_[0];
+    log_.clear();
+  }
+  const std::shared_ptr<Journal> journal = journals_({kLoopbackAddress, 49000});
+  ASSERT_EQ(journal->orphans("override").size(), 1U);
+  EXPECT_EQ(journal->orphans("override")[0].id, "left");
+  ASSERT_EQ(Journal(earlier, deadOwner()).entries().size(), 2U);
+  EXPECT_EQ(Journal(earlier, deadOwner()).entries()[0].id, "runs");
+  EXPECT_EQ(Journal(earlier, deadOwner()).entries()[1].id, "held") << "until its place is free";
+  EXPECT_TRUE(log_.empty());
+  std::ofstream(earlier) << "{";
+  journals_({kLoopbackAddress, 49000});
+  ASSERT_EQ(log_.size(), 1U);
+  EXPECT_NE(log_[0].find("cannot be understood"), std::string::npos) << log_[0];
+}
+
+TEST_F(JournalsIn, WhereTheAddressesOfThisComputerCannotBeListedTheFileIsNamedAfterThePeer) {
+  lists_addresses = false;
+  EXPECT_NO_THROW(EXPECT_EQ(fileOf(0x7F000101U), "127.0.0.1_49000.json"));
+  EXPECT_NO_THROW(EXPECT_EQ(fileOf(0xC0A80105U), "192.168.1.5_49000.json"));
+  lists_addresses = true;
+  ASSERT_EQ(log_.size(), 2U);
+  EXPECT_NE(log_[1].find("whether 192.168.1.5 is this computer"), std::string::npos) << log_[1];
 }
 
 TEST(EncodeUndo, GivesTheMessages) {

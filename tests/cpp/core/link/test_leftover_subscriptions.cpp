@@ -17,7 +17,8 @@ using Indices = std::map<std::int32_t, std::string>;
 class LeftoverSubscriptionsTest : public SimLinkRig {
  protected:
   Journal journalOf(const FakeXPlane& sim, const JournalOwner& owner) const {
-    return *Journal(journalPath(folder_, "127.0.0.1", sim.port()), owner).ofSubscriptions();
+    return *Journal(journalPath(folder_, "127.0.0.1", sim.port()), owner)
+                .ofSubscriptions({kLoopbackAddress, sim.port()});
   }
   static JournalOwner killed(const std::string& node) {
     JournalOwner owner = thisProcess(node);

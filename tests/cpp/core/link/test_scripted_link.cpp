@@ -3,122 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
-#include <cstring>
 #include <memory>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
-#include "scripted_hub.hpp"
-#include "xplane_bridge/core/link/sim_link.hpp"
+#include "scripted_link.hpp"
 
 namespace xplane_bridge::core {
 namespace {
 
-constexpr Endpoint kXPlane{0x0A010203U, 49000};
 constexpr Endpoint kNeighbour{0x0A010204U, 49000};
-constexpr std::int64_t kMs = kNanosecondsPerMillisecond;
-
-using Pairs = std::vector<std::pair<std::int32_t, float>>;
-
-std::vector<std::uint8_t> rref(const Pairs& pairs) {
-  std::vector<std::uint8_t> bytes = {'R', 'R', 'E', 'F', ','};
-  for (const auto& [index, value] : pairs) {
-    std::uint8_t pair[8];
-    std::memcpy(pair, &index, 4);
-    std::memcpy(pair + 4, &value, 4);
-    bytes.insert(bytes.end(), pair, pair + 8);
-  }
-  return bytes;
-}
-
-/// Row 3 with this speed in all slots.
-std::vector<std::uint8_t> data(float speed) {
-  std::vector<std::uint8_t> bytes = {'D', 'A', 'T', 'A', '*', 3, 0, 0, 0};
-  std::uint8_t value[4];
-  std::memcpy(value, &speed, 4);
-  for (int slot = 0; slot < 8; ++slot) {
-    bytes.insert(bytes.end(), value, value + 4);
-  }
-  return bytes;
-}
-
-std::vector<std::uint8_t> beacon(const std::string& computer_name = "sim") {
-  std::vector<std::uint8_t> bytes = {'B', 'E', 'C', 'N', 0, 1, 2, 1, 0, 0, 0};
-  const std::int32_t version = 122015;
-  const auto* begin = reinterpret_cast<const std::uint8_t*>(&version);
-  bytes.insert(bytes.end(), begin, begin + sizeof(version));
-  bytes.insert(bytes.end(), {1, 0, 0, 0, 0x68, 0xBF});  // master, port 49000
-  bytes.insert(bytes.end(), computer_name.begin(), computer_name.end());
-  bytes.push_back(0);
-  return bytes;
-}
-
-/// What a handler got: steady time, stamp, whether it is the kernel's, epoch, index and value.
-using Delivery = std::tuple<std::int64_t, std::int64_t, bool, std::uint32_t, std::int32_t, float>;
-
-class ScriptedLink : public testing::Test {
- protected:
-  static SimLinkOptions defaults() {
-    SimLinkOptions options;
-    options.host = "10.1.2.3";
-    options.port = 49000;
-    options.listen_for_beacon = false;
-    return options;
-  }
-  /// Data Output that X-Plane sends already.
-  static SimLinkOptions withRows(std::int32_t unheard_version = 0) {
-    SimLinkOptions options = defaults();
-    options.unheard_version = unheard_version;
-    options.data_output.enabled = true;
-    options.data_output.configure = false;
-    options.data_output.rows = {3};
-    return options;
-  }
-  void makeLink(const SimLinkOptions& options = defaults()) {
-    SimLinkCallbacks callbacks;
-    callbacks.on_data = [this](const DataView& data, const ReceiveInfo&) { rows_.push_back(data[0].value(0)); };
-    callbacks.on_state = [this](const LinkStatus& status) {
-      if (states_.empty() || states_.back().second != status.state) {
-        states_.emplace_back(wire_->now_ns, status.state);
-      }
-    };
-    link_ = std::make_unique<SimLink>(
-        options, callbacks, wire_->clock(),
-        [this](LogLevel level, const std::string& line) { log_.emplace_back(level, line); }, JournalFactory{},
-        std::make_unique<ScriptedHub>(wire_));
-    flight_ = link_->subscribe({"flight", {"a/b", "c/d"}, kEveryFrameRateHz, 0},
-                               [this](const RrefView& view, const ReceiveInfo& info) {
-                                 for (std::size_t i = 0; i < view.size(); ++i) {
-                                   delivered_.emplace_back(info.steady_ns, info.stamp_ns, info.kernel_stamp,
-                                                           info.link_epoch, view[i].index, view[i].value);
-                                 }
-                               });
-  }
-
-  void arrive(std::int64_t time_ns, const std::string& source, const std::vector<std::uint8_t>& bytes,
-              Endpoint from = kXPlane, std::int64_t kernel_stamp_ns = 0) {
-    wire_->arrivals.push_back({time_ns, source, bytes, from, kernel_stamp_ns});
-  }
-  /// The status that the link asks for by itself: version, paused, simulator time.
-  void arriveStatus(std::int64_t time_ns, float sim_time) {
-    arrive(time_ns, "control", rref({{0, 115501.0F}, {1, 0.0F}, {2, sim_time}}));
-  }
-  void runUntil(std::int64_t time_ns) {
-    while (wire_->now_ns < time_ns) {
-      link_->step(20);
-    }
-  }
-
-  std::shared_ptr<ScriptedHub::Wire> wire_ = std::make_shared<ScriptedHub::Wire>();
-  std::vector<std::pair<LogLevel, std::string>> log_;
-  std::vector<std::pair<std::int64_t, LinkState>> states_;
-  std::vector<Delivery> delivered_;
-  std::vector<float> rows_;  // first slots of the first rows of DATA
-  std::unique_ptr<SimLink> link_;
-  Subscription flight_;
-};
 
 TEST_F(ScriptedLink, StampsAndTimesComeFromTheScript) {
   makeLink();
@@ -161,26 +56,6 @@ TEST_F(ScriptedLink, AllThatIsSentGoesThroughTheSources) {
     }
   }
   EXPECT_EQ(asked, 2);
-}
-
-TEST_F(ScriptedLink, ASearchInVainIsWarnedOfOnceAndGivesTheReason) {
-  using Line = std::pair<LogLevel, std::string>;
-  makeLink();
-  runUntil(4900 * kMs);
-  EXPECT_EQ(log_, (std::vector<Line>{{LogLevel::kInfo, "looking for X-Plane at 10.1.2.3:49000, host '10.1.2.3'"}}));
-  EXPECT_EQ(link_->status().reason, "waiting for the first answer of 10.1.2.3:49000");
-  EXPECT_TRUE(link_->status().problems.empty());
-  runUntil(20'000 * kMs);
-  ASSERT_EQ(link_->status().problems.size(), 1U);
-  const std::string problem = link_->status().problems[0];
-  EXPECT_EQ(problem.rfind("no answer from 10.1.2.3:49000: start X-Plane", 0), 0U) << problem;
-  EXPECT_EQ(link_->status().reason, problem);
-  ASSERT_EQ(log_.size(), 2U) << "once, not every time it is looked at";
-  EXPECT_EQ(log_[1], Line(LogLevel::kWarn, problem));
-  arriveStatus(20'100 * kMs, 50.0F);
-  runUntil(20'200 * kMs);
-  EXPECT_EQ(link_->status().reason, "X-Plane answers");
-  EXPECT_TRUE(link_->status().problems.empty());
 }
 
 TEST_F(ScriptedLink, StatesFollowTheScriptsSilences) {
@@ -245,25 +120,6 @@ TEST_F(ScriptedLink, NoOtherProgramOfXPlanesComputerInjectsAState) {
   EXPECT_EQ(std::get<5>(delivered_[2]), 3.0F);
 }
 
-TEST_F(ScriptedLink, AnswersFromAnotherAddressAreNamed) {
-  makeLink();
-  for (int k = 1; k < 100; ++k) {
-    arrive(100 * k * kMs, "control", rref({{0, 115501.0F}}), {0x0A020203U, 49000});
-  }
-  runUntil(1000 * kMs);
-  const std::string problem =
-      "answers come from 10.2.2.3, but 10.1.2.3 is configured: X-Plane's computer has several addresses, or it is "
-      "another one; set the parameter host to 10.2.2.3";
-  EXPECT_EQ(link_->status().state, LinkState::kSearching);
-  EXPECT_EQ(link_->status().problems, std::vector<std::string>{problem});
-  EXPECT_EQ(link_->status().reason, problem);
-  runUntil(9000 * kMs);
-  EXPECT_EQ(link_->status().problems, std::vector<std::string>{problem}) << "not that nothing answers";
-  arriveStatus(10'000 * kMs, 50.0F);
-  runUntil(10'100 * kMs);
-  EXPECT_TRUE(link_->status().problems.empty());
-}
-
 TEST_F(ScriptedLink, FollowsToTheAddressThatIsLeftOfXPlanesComputer) {
   SimLinkOptions options = defaults();
   options.host = "";
@@ -299,45 +155,6 @@ TEST_F(ScriptedLink, FollowsToTheAddressThatIsLeftOfXPlanesComputer) {
   }
 }
 
-TEST_F(ScriptedLink, AnotherComputersXPlaneIsNotTheOneThatIsGone) {
-  SimLinkOptions options = defaults();
-  options.host = "";
-  options.listen_for_beacon = true;
-  for (const bool from_the_start : {false, true}) {  // it begins while ours is gone, or begins again
-    wire_ = std::make_shared<ScriptedHub::Wire>();
-    makeLink(options);
-    const Endpoint neighbours{0x0A010204U, 49000};
-    for (int k = 0; k < 500; ++k) {
-      const int now = 100 * k;
-      const bool ours = now <= 20'000 || now >= 40'000;
-      if (k % 10 == 0 && ours) {
-        arrive(now * kMs, "beacon", beacon(), kXPlane);
-      }
-      if (k % 10 == 5 && (now > 26'000 || (from_the_start && now > 8000 && now < 19'000))) {
-        arrive(now * kMs, "beacon", beacon("lab-2"), neighbours);
-      }
-      if (now > 2000 && ours) {
-        arriveStatus(now * kMs, 50.0F);
-      }
-    }
-    runUntil(39'000 * kMs);
-    EXPECT_EQ(link_->status().state, LinkState::kLost);
-    EXPECT_EQ(link_->status().peer, kXPlane);
-    EXPECT_EQ(link_->status().problems,
-              (std::vector<std::string>{"the X-Plane at 10.1.2.3:49000 is gone, and lab-2 (10.1.2.4:49000, version "
-                                        "122015) is on another computer: to go on with that one, set the parameter "
-                                        "host to it"}));
-    for (const auto& each : wire_->sent) {
-      EXPECT_NE(each.to, neighbours);
-    }
-    runUntil(42'000 * kMs);
-    EXPECT_EQ(link_->status().state, LinkState::kConnected);
-    EXPECT_TRUE(link_->status().problems.empty());
-    flight_.reset();
-    link_.reset();
-  }
-}
-
 TEST_F(ScriptedLink, AnXPlaneThatAnswersIsKeptWhereverItsBeaconComesFrom) {
   SimLinkOptions options = defaults();
   options.host = "";
@@ -360,61 +177,6 @@ TEST_F(ScriptedLink, AnXPlaneThatAnswersIsKeptWhereverItsBeaconComesFrom) {
   EXPECT_EQ(link_->status().peer, kXPlane) << "a short silence, as when it loads";
   runUntil(23'000 * kMs);
   EXPECT_EQ(link_->status().peer, second);
-}
-
-TEST_F(ScriptedLink, DataWithoutAnswersIsOneWayAndItsVersionIsTheOption) {
-  for (const std::int32_t given : {0, 122015}) {
-    wire_ = std::make_shared<ScriptedHub::Wire>();
-    makeLink(withRows(given));
-    for (int k = 0; k < 100; ++k) {
-      arrive((1000 + 50 * k) * kMs, "data", data(1.0F));
-      if (k == 80) {
-        arriveStatus(5000 * kMs, 50.0F);
-      }
-    }
-    runUntil(2900 * kMs);
-    EXPECT_FALSE(link_->status().one_way) << "it may still answer";
-    EXPECT_FALSE(link_->status().version.known());
-    runUntil(4000 * kMs);
-    LinkStatus status = link_->status();
-    EXPECT_EQ(status.state, LinkState::kConnected);
-    EXPECT_TRUE(status.one_way);
-    EXPECT_EQ(status.version.number, given);
-    ASSERT_EQ(status.problems.size(), given == 0 ? 2U : 1U);
-    EXPECT_EQ(status.problems[0].rfind("X-Plane sends Data Output, but nothing answers on 10.1.2.3:49000", 0), 0U);
-    if (given == 0) {
-      EXPECT_NE(status.problems[1].find("set the parameter xplane_version"), std::string::npos);
-    }
-    EXPECT_TRUE(link_->unansweredDatarefs().empty()) << "that is said of X-Plane, not of each dataref";
-    runUntil(5500 * kMs);
-    status = link_->status();
-    EXPECT_FALSE(status.one_way);
-    EXPECT_EQ(status.version.number, 115501) << "what X-Plane says itself";
-    EXPECT_TRUE(status.problems.empty());
-    flight_.reset();
-    link_.reset();
-  }
-}
-
-TEST_F(ScriptedLink, OneThatNeverAnswersIsNotTakenForTheOneThatDid) {
-  for (const std::int32_t given : {0, 122015}) {
-    wire_ = std::make_shared<ScriptedHub::Wire>();
-    makeLink(withRows(given));
-    arriveStatus(1000 * kMs, 50.0F);
-    for (int k = 0; k < 100; ++k) arrive((20'000 + 50 * k) * kMs, "data", data(1.0F));
-    runUntil(19'000 * kMs);
-    ASSERT_EQ(link_->status().state, LinkState::kLost);
-    EXPECT_EQ(link_->status().version.number, 115501);
-    runUntil(21'000 * kMs);
-    EXPECT_EQ(link_->status().version.number, 115501) << "it may still answer";
-    runUntil(24'000 * kMs);
-    EXPECT_TRUE(link_->status().one_way);
-    EXPECT_EQ(link_->status().version.number, given);
-    runUntil(26'000 * kMs);
-    EXPECT_EQ(link_->status().version.number, given) << "in a silence, too";
-    flight_.reset();
-    link_.reset();
-  }
 }
 
 TEST_F(ScriptedLink, AVersionIsJudgedOnceWhetherXPlaneAnswersItOrTheOptionGivesIt) {

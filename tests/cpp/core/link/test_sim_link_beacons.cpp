@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "journal_file.hpp"
 #include "sim_link_rig.hpp"
 #include "xplane_bridge/core/link/sim_link.hpp"
 
@@ -106,6 +107,66 @@ TEST_F(SimLinkTest, FollowsARestartOnAnotherPort) {
   EXPECT_LE(back, 1.0);
   EXPECT_EQ(link_->status().peer.port, other.port());
   EXPECT_EQ(link_->status().epoch, 2U);
+}
+
+TEST_F(SimLinkTest, WhatItHasNotedGoesWithXPlaneToAnotherPort) {
+  auto sim = std::make_unique<FakeXPlane>();
+  beacons_ = true;
+  SimLinkOptions options = optionsForBeacon();
+  options.data_output.enabled = true;
+  options.data_output.rows = {3};
+  makeLink(options);
+  const std::shared_ptr<Journal> old = [&] {
+    runUntil([&] { return data_datagrams_ > 0; }, 5.0, {sim.get()});
+    return link_->journal();
+  }();
+  ASSERT_NE(old, nullptr);
+  old->record("override:a/b", "override", {UndoDref{"a/b", 0.0F}});
+  const Endpoint old_peer = link_->status().peer;
+  ASSERT_EQ(old->own().size(), 2U) << "and Data Output";
+  Journal(old->path(), {"/crashed", 4'000'000, 1, old->self().boot_id, old->self().computer})
+      .record("override:c/d", "override", {UndoDref{"c/d", 0.0F}});
+  FakeXPlane other;  // before the old port is free again
+  sim.reset();
+  ASSERT_GE(runUntilState(LinkState::kLost, 5.0, {}), 0.0);
+  ASSERT_GE(runUntil([&] { return link_->status().peer.port == other.port(); }, 5.0, {&other}), 0.0);
+  const std::shared_ptr<Journal> now = link_->journal();
+  EXPECT_EQ(now->own().size(), 2U) << "for the guardian, before X-Plane answers";
+  EXPECT_TRUE(old->own().empty());
+  old->record("override:e/f", "override", {UndoDref{"e/f", 0.0F}});  // by a thread that had the old one in its hand
+  ASSERT_GE(runUntilState(LinkState::kConnected, 5.0, {&other}), 0.0);
+  run(0.5, {&other});
+  EXPECT_EQ(now->own().size(), 3U);
+  EXPECT_EQ(now->ofSubscriptions(link_->status().peer)->own().size(), 1U);
+  EXPECT_TRUE(old->ofSubscriptions(old_peer)->entries().empty());
+  ASSERT_EQ(old->entries().size(), 1U);
+  EXPECT_EQ(old->entries()[0].owner.node, "/crashed") << "another process's stays";
+}
+
+TEST_F(SimLinkTest, WhatItHasNotedIsMovedOnceNoProcessHasTheJournalLocked) {
+  auto sim = std::make_unique<FakeXPlane>();
+  beacons_ = true;
+  makeLink(optionsForBeacon());
+  ASSERT_GE(runUntilState(LinkState::kConnected, 5.0, {sim.get()}), 0.0);
+  const std::shared_ptr<Journal> old = link_->journal();
+  old->record("override:a/b", "override", {UndoDref{"a/b", 0.0F}});
+  FakeXPlane other;  // before the old port is free again
+  sim.reset();
+  auto held = std::make_unique<HeldLock>(journalPath(folder_, "127.0.0.1", other.port()));
+  ASSERT_GE(runUntilState(LinkState::kLost, 5.0, {}), 0.0);
+  ASSERT_GE(runUntilState(LinkState::kConnected, 5.0, {&other}), 0.0);
+  run(1.0, {&other});
+  const std::shared_ptr<Journal> now = link_->journal();
+  ASSERT_NE(now->path(), old->path());
+  EXPECT_TRUE(now->own().empty());
+  EXPECT_EQ(old->own().size(), 1U);
+  EXPECT_EQ(std::count_if(log_.begin(), log_.end(),
+                          [](const std::string& line) { return line.find("has it locked") != std::string::npos; }),
+            1);
+  held.reset();
+  run(0.3, {&other});
+  EXPECT_EQ(now->own().size(), 1U);
+  EXPECT_TRUE(old->entries().empty());
 }
 
 TEST_F(SimLinkTest, NeverJumpsToAnXPlaneThatWasThereAllAlong) {

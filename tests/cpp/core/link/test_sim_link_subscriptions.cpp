@@ -68,7 +68,7 @@ TEST_F(SimLinkTest, StoppedInALongSilenceItsSubscriptionsStayInTheJournal) {
   run(0.2, {&sim});
   ASSERT_GE(runUntilState(LinkState::kLost, 20.0, {}), 0.0);  // loading a flight takes longer at times
   link_->stop(1.0);
-  EXPECT_EQ(link_->journal()->ofSubscriptions()->entries().size(), 1U);
+  EXPECT_EQ(link_->journal()->ofSubscriptions(link_->status().peer)->entries().size(), 1U);
 }
 
 TEST_F(SimLinkTest, LostRequestIsRepeated) {
@@ -343,7 +343,7 @@ TEST_F(SimLinkTest, ALostEndOfASubscriptionIsMadeGood) {
   link_->stop(1.0);
   sim.pump();
   EXPECT_EQ(sent(), 0U);
-  EXPECT_TRUE(link_->journal()->ofSubscriptions()->entries().empty());
+  EXPECT_TRUE(link_->journal()->ofSubscriptions(link_->status().peer)->entries().empty());
 }
 
 TEST_F(SimLinkTest, XPlaneConnectIsAskedForThePosition) {
