@@ -18,6 +18,10 @@ std::string namesOf(const std::vector<BeaconSighting>& sightings) {
   return join(sightings, ", ", [](const BeaconSighting& sighting) { return toString(sighting); });
 }
 
+bool isRecent(const std::optional<std::int64_t>& time_ns, std::int64_t now_ns) {
+  return time_ns.has_value() && toSeconds(now_ns - *time_ns) <= kRecentS;
+}
+
 bool contains(const std::vector<std::string>& texts, const std::string& text) {
   return std::find(texts.begin(), texts.end(), text) != texts.end();
 }
@@ -50,7 +54,7 @@ void SimLink::findSearchProblems(std::int64_t now_ns, std::vector<std::string>* 
       }
     }
   }
-  if (other_address_.has_value() && toSeconds(now_ns - other_address_->time_ns) <= kRecentS) {
+  if (other_address_.has_value() && isRecent(other_address_->time_ns, now_ns)) {
     const std::string from = other_address_->from.addressString();
     problems->push_back(
         "answers come from " + from +
@@ -60,7 +64,7 @@ void SimLink::findSearchProblems(std::int64_t now_ns, std::vector<std::string>* 
         ": X-Plane's computer has several addresses, or it is another one; set the parameter host to " + from);
   } else if (peer_.valid() && monitor_.state() == LinkState::kSearching && searched_s > kPatienceS) {
     problems->push_back("no answer from " + peer_.toString() +
-                        (control_source_->counters().refused > 0
+                        (isRecent(refused_ns_, now_ns)
                              ? ": that computer is there, but nothing listens on the port: start X-Plane, or set port"
                              : ": start X-Plane; check the address, firewalls and, in X-Plane 12, Settings > Network > "
                                "Accept incoming connections"));
@@ -87,11 +91,11 @@ std::vector<std::string> SimLink::findProblems(std::int64_t now_ns) const {
           "out: set the parameter xplane_version");
     }
   }
-  if (intruder_.has_value() && toSeconds(now_ns - intruder_->time_ns) <= kRecentS) {
+  if (intruder_.has_value() && isRecent(intruder_->time_ns, now_ns)) {
     problems.push_back("another program at " + intruder_->from.toString() +
                        " sends X-Plane's messages as well: they are dropped");
   }
-  if (!data_output_.problem().empty()) {
+  if (monitor_.alive() && !data_output_.problem().empty()) {  // which is said of an X-Plane that answers
     problems.push_back(data_output_.problem());
   }
   return problems;
@@ -181,6 +185,8 @@ void SimLink::publish(std::int64_t now_ns) {
   status.problems = findProblems(now_ns);
   if (status.state == LinkState::kSearching && !status.problems.empty()) {
     status.reason = join(status.problems, "; ");
+  } else if (status.state == LinkState::kLost && !status.problems.empty()) {
+    status.reason += ": " + join(status.problems, "; ");
   }
   bool changed = false;
   bool state_changed = false;

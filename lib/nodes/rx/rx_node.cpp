@@ -19,8 +19,8 @@ namespace {
 
 constexpr double kSupervisePeriod = 0.1;  // [s]
 // An X-Plane that answers but does not say its version within this is treated as of unknown version.
-constexpr double kVersionPatience = 2.0;         // [s]
-constexpr double kSearchingPublishPeriod = 1.0;  // [s]
+constexpr double kVersionPatience = 2.0;    // [s]
+constexpr double kAwayPublishPeriod = 1.0;  // [s]
 constexpr std::int32_t kRposCheckRateHz = 20;
 // Further away, a flight state says nothing about the time of another datagram.
 constexpr double kNearState = 0.1;  // [s]
@@ -368,8 +368,9 @@ void RxNode::supervise() {
     const std::lock_guard<std::mutex> lock(mutex_);
     publishExperiment();
   }
-  if (status.state == core::LinkState::kSearching && (!search_word_pause_ || search_word_pause_->over())) {
-    search_word_pause_.emplace(clock(), kSearchingPublishPeriod);
+  const bool away = status.state == core::LinkState::kSearching || status.state == core::LinkState::kLost;
+  if (away && (!search_word_pause_ || search_word_pause_->over())) {
+    search_word_pause_.emplace(clock(), kAwayPublishPeriod);
     const std::lock_guard<std::mutex> lock(mutex_);
     publishLinkState(status);
   }

@@ -103,6 +103,7 @@ def test_lost_when_silent_for_long(world, rx):
     emulator.kill()
     link = wait_for_link(world, "LOST")
     assert link.silence >= 1.0
+    assert wait_for_link(world, "LOST").silence > link.silence, "each second meanwhile"
     world.wait_for_diagnostics("link to X-Plane", lambda s: s.level == 2 and "LOST" in s.message)
     for name in ("clock", "position"):  # no more what they were
         assert world.wait_for_diagnostics(name, lambda s: s.level == 1).message == "not connected"

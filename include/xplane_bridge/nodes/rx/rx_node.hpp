@@ -130,7 +130,7 @@ class RxNode : public BaseNode {
   // Timer only.
   std::optional<core::SimulatorVersion> adopted_version_;
   std::optional<core::Deadline> version_patience_;   ///< running while X-Plane answers without saying its version
-  std::optional<core::Deadline> search_word_pause_;  ///< running since SEARCHING was published last
+  std::optional<core::Deadline> search_word_pause_;  ///< running since SEARCHING or LOST was published last
   std::int32_t rpos_rate_ = 0;
 
   // Diagnostics thread only.
