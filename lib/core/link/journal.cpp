@@ -436,7 +436,7 @@ JournalFactory journalsIn(const std::string& folder, const std::string& node, Lo
     if (std::none_of(own.begin(), own.end(), [&peer](std::uint32_t each) { return isSameHost(each, peer.address); })) {
       return open(peer.address, peer.port);
     }
-    const std::shared_ptr<Journal> journal = open(kLoopbackAddress, peer.port);
+    std::shared_ptr<Journal> journal = open(kLoopbackAddress, peer.port);
     for (const std::uint32_t address : own) {
       Journal earlier = open(address, peer.port)->withoutWaiting();
       if (earlier.path() == journal->path()) {
