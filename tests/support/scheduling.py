@@ -32,12 +32,12 @@ def long_ones_first(config: Any, log: Any, long: Sequence[str], busy: Sequence[s
         log: pytest-xdist's.
         long: As of `rank`, by which the tests are in order already.
         busy: Folders and files of tests that keep a processor busy, e.g. "flights/".
-        at_once: How many processes run such ones at once; 0: one more than there are processors, as each of them also
+        at_once: How many processes run such ones at once; 0: two more than there are processors, as each of them also
             waits at times.
     """
     from xdist.scheduler import LoadFileScheduling
 
-    lanes = at_once or len(os.sched_getaffinity(0)) + 1
+    lanes = at_once or len(os.sched_getaffinity(0)) + 2
 
     class LongOnesFirst(LoadFileScheduling):
         def _split_scope(self, nodeid: str) -> str:
