@@ -114,25 +114,30 @@ def _leaves(node: Optional[yaml.Node], above: str = "") -> Iterator[Tuple[str, y
             yield f"{above}{key.value}", value
 
 
-def _readable(_: str, value: str, __: Given) -> str:
-    """A file of parameters: there, readable, YAML, a mapping."""
+def _read(value: str) -> Tuple[str, Optional[yaml.Node]]:
+    """A file of parameters (there, readable, YAML, a mapping): what is wrong, and its content."""
     try:
         node = _composed(Path(value))
     except OSError as error:
-        return f"{error.strerror}; expected a YAML file of parameters"
+        return f"{error.strerror}; expected a YAML file of parameters", None
     except UnicodeDecodeError:
-        return "is no text; expected a YAML file of parameters"
+        return "is no text; expected a YAML file of parameters", None
     except yaml.YAMLError as error:
-        return yaml_problem(error)
+        return yaml_problem(error), None
     if node is not None and not isinstance(node, yaml.MappingNode):
-        return "is YAML, but no list of `key: value`"
-    return ""
+        return "is YAML, but no list of `key: value`", None
+    return "", node
 
 
-def _parameters(name: str, value: str, given: Given) -> str:
+def _readable(_: str, value: str, __: Given) -> str:
+    """A file of parameters that a program of ours reads."""
+    return _read(value)[0]
+
+
+def _parameters(_: str, value: str, __: Given) -> str:
     """A file of parameters that roslaunch loads; where it cannot, it names neither the file nor the key."""
-    problem = _readable(name, value, given)
-    return problem or "; ".join(" ".join(each) for each in unsettable(_composed(Path(value))))
+    problem, node = _read(value)
+    return problem or "; ".join(" ".join(each) for each in unsettable(node))
 
 
 def _common(name: str, value: str, given: Given) -> str:
