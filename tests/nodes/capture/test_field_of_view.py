@@ -6,11 +6,12 @@ import contextlib
 import re
 import socket
 import threading
-from typing import Iterator
+from typing import ContextManager
 
 import pytest
 
 from support.deadlines import WAIT_S
+from support.meanwhile import meanwhile
 from support.nodes.tx_fixtures import call, journal_entries, tx_params
 from xplane_bridge import protocol
 from xplane_bridge.eye.wire import encode_hello, encode_status
@@ -123,26 +124,18 @@ def sender_node(world, port: int, camera: str = "") -> tuple[ManagedProcess, str
     return ManagedProcess(f"capture_{camera.rstrip('/')}", words, world.folder, env=world.env), listen
 
 
-@contextlib.contextmanager
-def silent_eye(listen: str) -> Iterator[None]:
+def silent_eye(listen: str) -> ContextManager[None]:
     """Connects to a capture_node, lives, and measures without an end."""
     host, port = listen.split(":")
-    ended = threading.Event()
     receiver = wait_until(lambda: connected(host, int(port)), 60.0, "a capture_node that listens")
 
-    def live() -> None:
+    def live(ended: threading.Event) -> None:
         receiver.sendall(encode_hello(0, "", "127.0.0.1"))
         while not ended.wait(0.2):
             receiver.sendall(encode_status(0, "it calibrates"))
         receiver.close()
 
-    living = threading.Thread(target=live)
-    living.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        living.join()
+    return meanwhile(live)
 
 
 def connected(host: str, port: int) -> socket.socket | None:
@@ -170,24 +163,16 @@ def test_one_camera_measures_at_a_time_also_by_its_eye(world) -> None:
         assert not journal_entries(world)
 
 
-@contextlib.contextmanager
-def steps_of_another(wire) -> Iterator[None]:
+def steps_of_another(wire) -> ContextManager[None]:
     """X-Plane's field of view meanwhile steps as an eye measures at its start, with nothing in the journal."""
-    ended = threading.Event()
 
-    def step() -> None:
+    def step(ended: threading.Event) -> None:
         while not ended.wait(0.25):
             wire.send(protocol.DrefWrite(FIELD_OF_VIEW, USERS_DEG + 8.0))
             ended.wait(0.25)
             wire.send(protocol.DrefWrite(FIELD_OF_VIEW, USERS_DEG))
 
-    stepping = threading.Thread(target=step)
-    stepping.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        stepping.join()
+    return meanwhile(step)
 
 
 def test_a_step_of_an_eyes_own_measurement_is_not_taken_for_the_users(world) -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import contextlib
 import sys
 import threading
-from typing import Iterator
+from typing import ContextManager
 
 import numpy as np
 import pytest
 
 from support.deadlines import WAIT_S
+from support.meanwhile import meanwhile
 from xplane_bridge.eye.jpeg import encoder
 from xplane_bridge.eye.pairing import Decision, Frame
 from xplane_bridge.eye.sender import Sender
@@ -21,29 +22,21 @@ TITLE = "Still life"
 FROZEN = "frozen: the aircraft moves, the picture does not"
 
 
-@contextlib.contextmanager
-def moving(world) -> Iterator[None]:
+def moving(world) -> ContextManager[None]:
     """A flight state that moves, of an X-Plane that does not answer, while capture_node runs."""
     import rospy
     from xplane_bridge.msg import FlightState
 
     state = rospy.Publisher(f"{world.namespace}/flight_state", FlightState, queue_size=1)
     wait_until(state.get_num_connections, WAIT_S, "capture_node's ear")
-    ended = threading.Event()
 
-    def move() -> None:
+    def move(ended: threading.Event) -> None:
         roll = 0.0
         while not ended.wait(0.05):
             roll += 1.0
             state.publish(FlightState(roll_deg=roll % 90.0))
 
-    mover = threading.Thread(target=move)
-    mover.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        mover.join()
+    return meanwhile(move)
 
 
 def wait_for_said(world, text: str) -> int:
