@@ -176,6 +176,10 @@ void write(const std::string& path, const std::vector<JournalEntry>& entries) {
   syncFolder(path);
 }
 
+std::vector<JournalEntry>::iterator entryOf(std::vector<JournalEntry>* entries, const std::string& id) {
+  return std::find_if(entries->begin(), entries->end(), [&id](const JournalEntry& each) { return each.id == id; });
+}
+
 /// Whether both put back the same thing, if perhaps to another value.
 bool isSameChange(const UndoOperation& a, const UndoOperation& b) {
   if (a.index() != b.index()) {
@@ -311,8 +315,7 @@ void Journal::record(std::vector<JournalRecord> records) {
   std::vector<JournalEntry> entries = read(path_);
   for (JournalRecord& record : records) {
     JournalEntry entry{record.id, record.purpose, self_, std::move(record.undo), "", std::move(record.subscriptions)};
-    const auto same =
-        std::find_if(entries.begin(), entries.end(), [&](const JournalEntry& each) { return each.id == record.id; });
+    const auto same = entryOf(&entries, record.id);
     if (same == entries.end()) {
       entries.push_back(std::move(entry));
     } else if (same->owner != self_ && alive_(same->owner)) {
@@ -382,8 +385,7 @@ std::vector<JournalEntry> Journal::adopt(const std::vector<JournalEntry>& offere
   std::vector<JournalEntry> entries = read(path_);
   std::vector<JournalEntry> adopted;
   for (const JournalEntry& entry : offered) {
-    const auto same =
-        std::find_if(entries.begin(), entries.end(), [&](const JournalEntry& each) { return each.id == entry.id; });
+    const auto same = entryOf(&entries, entry.id);
     if (same == entries.end()) {
       entries.push_back(entry);
     } else if (same->owner == entry.owner || (same->owner != self_ && !alive_(same->owner))) {
