@@ -16,6 +16,19 @@
 
 namespace xplane_bridge::core {
 
+using Pairs = std::vector<std::pair<std::int32_t, float>>;
+
+inline std::vector<std::uint8_t> rref(const Pairs& pairs) {
+  std::vector<std::uint8_t> bytes = {'R', 'R', 'E', 'F', ','};
+  for (const auto& [index, value] : pairs) {
+    std::uint8_t pair[8];
+    std::memcpy(pair, &index, 4);
+    std::memcpy(pair + 4, &value, 4);
+    bytes.insert(bytes.end(), pair, pair + 8);
+  }
+  return bytes;
+}
+
 /// Datagrams of a list instead of sockets, under a clock that only wait() moves: to the next datagram, or by the whole
 /// time-out. What is sent is kept.
 class ScriptedHub : public DatagramHub {

@@ -19,19 +19,6 @@ namespace xplane_bridge::core {
 inline constexpr Endpoint kXPlane{0x0A010203U, 49000};
 inline constexpr std::int64_t kMs = kNanosecondsPerMillisecond;
 
-using Pairs = std::vector<std::pair<std::int32_t, float>>;
-
-inline std::vector<std::uint8_t> rref(const Pairs& pairs) {
-  std::vector<std::uint8_t> bytes = {'R', 'R', 'E', 'F', ','};
-  for (const auto& [index, value] : pairs) {
-    std::uint8_t pair[8];
-    std::memcpy(pair, &index, 4);
-    std::memcpy(pair + 4, &value, 4);
-    bytes.insert(bytes.end(), pair, pair + 8);
-  }
-  return bytes;
-}
-
 /// Row 3 with this speed in all slots.
 inline std::vector<std::uint8_t> data(float speed) {
   std::vector<std::uint8_t> bytes = {'D', 'A', 'T', 'A', '*', 3, 0, 0, 0};

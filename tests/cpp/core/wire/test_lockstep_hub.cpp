@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <memory>
 #include <string>
 #include <utility>
@@ -52,15 +51,8 @@ class LockstepHubTest : public testing::Test {
     source->sendTo({message.data(), *size}, kXPlane, nullptr);
   }
 
-  void arrive(const std::string& source, std::vector<std::pair<std::int32_t, float>> pairs) {
-    std::vector<std::uint8_t> bytes = {'R', 'R', 'E', 'F', ','};
-    for (const auto& [index, value] : pairs) {
-      std::uint8_t pair[8];
-      std::memcpy(pair, &index, 4);
-      std::memcpy(pair + 4, &value, 4);
-      bytes.insert(bytes.end(), pair, pair + 8);
-    }
-    wire_->arrivals.push_back({wire_->now_ns, source, bytes, kXPlane, 12345});
+  void arrive(const std::string& source, const Pairs& pairs) {
+    wire_->arrivals.push_back({wire_->now_ns, source, rref(pairs), kXPlane, 12345});
   }
   void value(const std::string& source, float value) { arrive(source, {{0, value}}); }
   void fence(const std::string& source, float frame, float seconds = 0.0F, float microseconds = 0.0F,
